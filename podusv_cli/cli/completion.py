@@ -75,10 +75,10 @@ def _folder() -> Path | None:
 
 
 def _state() -> str:
-    """A digest of podusv's files, its scenarios and the installed plug-ins: another state, other
-    words.
+    """A digest of podusv's files, its scenarios and the installed plug-ins.
 
-    Files count by name and time, as reading them at every Tab would be slow.
+    The words that completion remembers hold as long as it stays the same. Files count by name and
+    time, as reading them at every Tab would be slow.
     """
     import hashlib
     from pathlib import Path

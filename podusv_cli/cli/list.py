@@ -75,8 +75,10 @@ def list(
 
 
 def parts(plugins: Known) -> Iterator[ListPart]:
-    """All parts, in the order of the list; `plugins` are plug-ins whose kinds, presets, ... it has
-    too."""
+    """All parts, in the order of the list.
+
+    `plugins` are plug-ins whose kinds, presets, metrics, figures and findings are in it, too.
+    """
     # Here and not above: the models are slow to import, and most commands do not list them.
     from podusv_cli.metrics.table import metrics_with
     from podusv_cli.scenario.explain import first_sentence, kinds
@@ -113,8 +115,7 @@ SIZES = {"length": "m", "beam": "m", "m": "kg"}  # what tells vessels apart at o
 
 
 def _size(presets: Presets, name: str, plugins: Known) -> str:
-    """Length, beam and mass of a vessel with units; "" for other presets, which have
-    none of them."""
+    """Length, beam and mass of a vessel with units; "" for presets of other sections."""
     from podusv_cli.scenario.presets import preset_text
 
     sizes = {key: preset_text(presets, name, key, plugins) for key in SIZES}

@@ -56,8 +56,10 @@ def in_words(size: float) -> str:
 
 
 def show(contents: PackedContents) -> None:
-    """Print what a packed folder has: kind, code, pages, packages, and versions that
-    differ here."""
+    """Print what a packed folder has, and which versions differ here.
+
+    That is kind, code, pages and packages.
+    """
     sizes = contents.sizes
     count = f"{len(sizes)} files, {in_words(sum(sizes.values()))}"
     facts = f"{contents.kind}, {contents.status}: {count}"

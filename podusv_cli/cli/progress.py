@@ -95,8 +95,10 @@ def compiling(bars: Bars | None, *, wanted: bool = False) -> Callable[[float], N
 
 
 def _say_once_after(seconds: float, text: str) -> Callable[[float], None]:
-    """A function to call with the fraction done; prints `text` once where that takes over
-    `seconds`."""
+    """A function to call with the fraction done, from 0 to 1.
+
+    It prints `text` once if the work is not done `seconds` after the first call.
+    """
     begins: list[float] = []
 
     def tell(fraction: float) -> None:

@@ -176,8 +176,10 @@ class Evaluation(Walk):
         return False
 
     def property(self, node: ast.expr) -> Condition:
-        """The answer of a check of a run, such as `finished(pid)`; also kept as
-        evidence (1 or 0)."""
+        """The answer of a check of a run, such as `finished(pid)`.
+
+        Also kept as evidence (1 or 0).
+        """
         if not isinstance(node, ast.Call):
             refuse(node, f"not a condition; compare numbers, or use one of {', '.join(CHECKS)}")
         name = known_name(function(node), CHECKS, "check")

@@ -56,8 +56,10 @@ class Track:
         return (self.times >= begin) & (self.times <= end)
 
     def start_clock_at(self, begin: float) -> Track:
-        """The track, its clock moved so that its first position is at `begin` [s], if aligned by
-        START."""
+        """The track, its clock moved so that it begins at `begin` [s].
+
+        A track that is not aligned by START stays as it is.
+        """
         if self.aligned != START:
             return self
         shifted = begin - float(self.times[0])
@@ -88,10 +90,10 @@ class Track:
         return replace(self, signals=signals, remarks=(*self.remarks, self.remark(text)))
 
     def about(self, run: RunAbout, counts_to: float = math.inf) -> RunAbout:
-        """What the track says about itself beside a run: the same task, as long as it lasts, no
-        law.
+        """What the track says about itself beside a run.
 
-        `counts_to` [s] is when the last of the runs beside it has done its path.
+        It has the run's task, its own duration, and no law. `counts_to` [s] is when the last of the
+        runs beside it has done its path.
         """
         said = {**run.said, "controller": NO_LAW}
         return run.model_copy(
@@ -109,8 +111,10 @@ class Track:
         )
 
     def beside(self, run: Recording, label: str, about: RunAbout) -> PastRun:
-        """The track as a run, with the target of `run` at its own times; `about` is that of the
-        method."""
+        """The track as a run, with the target of `run` at the track's own times.
+
+        `about` is what the track says about itself.
+        """
         signals = {"time": self.times, **self.signals}
         for name in TARGET:
             signals[name] = np.interp(self.times, run["time"], run[name])
@@ -121,10 +125,10 @@ class Track:
         return PastRun(label, about, log, folder=self.file)
 
     def departures(self, run: Recording) -> dict[str, float]:
-        """How far a run is from the track where times agree, by metric; over FEWEST instants at
-        least.
+        """How far a run is from the track where times agree, by metric.
 
-        Headings count where the track has one; they are NaN where it has fewer than FEWEST.
+        Metrics need FEWEST such instants at least. Headings count where the track has one; they are
+        NaN where it has fewer than FEWEST.
         """
         times = run["time"]
         rows = self.common(times[0], times[-1]) if len(times) else np.zeros(len(self.times), bool)
@@ -172,8 +176,10 @@ class Track:
         return [self.remark(text)]
 
     def _beside_speeds(self, label: str, run: Recording) -> list[Finding]:
-        """A remark where the track is SCALED times faster or slower than a run, as in
-        other units."""
+        """A remark where the track is SCALED times faster or slower than a run.
+
+        Then it may have other units. Empty otherwise.
+        """
         own, other = _path(self.times, self.signals), _path(run["time"], run.signals)
         if not own or not other or 1.0 / SCALED < own / other < SCALED:
             return []

@@ -237,11 +237,10 @@ def _metrics_without_best(
 def leaders(
     frame: MetricTable, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = ()
 ) -> dict[str, list[str]]:
-    """The metrics in which each run is best, by label; equal numbers and measured times rank
-    nobody.
+    """The metrics in which each run is best, by label.
 
-    Numbers are compared as printed. `unsettled` runs, which do not end at their target, are left
-    out.
+    Equal numbers and measured times make no run the best. Numbers are compared as printed.
+    `unsettled` runs, which do not end at their target, are left out.
     """
     unranked = _metrics_without_best(frame, known)
     best: dict[str, list[str]] = {column: [] for column in frame.columns if column not in unsettled}
@@ -388,8 +387,10 @@ def _stack_lines(lines: Sequence[str]) -> str:
 
 
 def _cut(text: str) -> list[str]:
-    """A number up to its decimal point, and the rest with the ratio; bold where it is
-    marked best."""
+    """A number up to its decimal point, and the rest with the ratio.
+
+    Both are bold where the number is marked best.
+    """
     number, _, ratio = text.partition(" (")
     whole, point, power = _parts(number.removesuffix("*"))
     cut = [whole, point + power]

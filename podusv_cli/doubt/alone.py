@@ -88,8 +88,10 @@ class TriedChoice:
         return any(not t.judged.failed and not t.judged.same(claim, base) for t in self.trials)
 
     def turns(self, claim: str, base: Judged) -> list[Turn]:
-        """Where a claim's verdict turns: for words each that does, for numbers the nearest on each
-        side."""
+        """Where a claim's verdict turns: at words, or at the nearest number on each side.
+
+        Each word that turns it is listed.
+        """
         turned = [t for t in self.trials if t.judged.contradicts(claim, base)]
         if not self.choice.range:
             return [Turn(self.choice, t.value, self.choice.own, 0.0) for t in turned]
@@ -235,8 +237,10 @@ def _golden(
 
 
 def _bisect(side: _Side, claim: str) -> None:
-    """Find where a verdict turns first, to the ratio SHARP, or that one unit in the last place
-    turns it."""
+    """Find where a verdict turns first, and add the tries to the side.
+
+    It is found to the ratio SHARP. The search ends early if one unit in the last place turns it.
+    """
     # A number that is 0 has no last place; that of its scale stands for it.
     near, last = NEAR * side.scale, math.ulp(side.choice.own or side.scale)
     pairs = pairwise([last, *sorted(side.trials)])

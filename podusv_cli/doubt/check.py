@@ -35,8 +35,10 @@ def _faults_of_printed(scenario: Scenario) -> Faults:
 
 
 def _vary(scenario: Scenario) -> Faults:
-    """Keys in `doubt.vary` that cannot be moved: unknown ones, and rows where a study
-    draws itself."""
+    """Keys in `doubt.vary` that cannot be moved.
+
+    These are unknown keys, and rows where a study draws rows itself.
+    """
     assert scenario.doubt
     known = by_key(with_loads(scenario.singles()))
     for name, quantity in scenario.doubt.vary.items():

@@ -57,8 +57,10 @@ class Choice:
         return frozenset(label for label, _ in self.places)
 
     def at(self, value: Any) -> dict[Place, Any]:
-        """What every place has for a value of the choice; for rows, a value is the
-        number of a row."""
+        """What every place has for a value of the choice.
+
+        For rows, a value is the number of a row.
+        """
         if not self.rows:
             return dict.fromkeys(self.places, value)
         row = dict(zip(self.rows.lines.names, self.rows.lines.rows[value].tolist(), strict=True))
@@ -269,8 +271,10 @@ def _values(key: Key, own: Any) -> tuple[Any, ...]:
 
 
 def _beside(places: Sequence[Place], singles: Singles) -> frozenset[str]:
-    """The laws of the same kind that have another value at these places of a law; none
-    elsewhere."""
+    """The laws of the same kind that have another value at these places of a law.
+
+    Empty where the places are those of another section.
+    """
     own = {label for label, _ in places}
     if places[0][1][0] != "controller":
         return frozenset()

@@ -104,11 +104,11 @@ def _lanes(
     numbers: Vector,
     order: Sequence[int],
 ) -> list[int]:
-    """The columns of the draws to show: those that explain the turns, then those the number
-    follows.
+    """The columns of the draws to show.
 
-    `numbers` and `order` are (draws,): the claim's number, and the draws from its least to its
-    largest. `acting` are names of choices.
+    First those that explain the turns, then those that the number follows. `numbers` and `order`
+    are (draws,): the claim's number, and the draws from its least to its largest. `acting` are
+    names of choices.
     """
     draws = report.tried.draws
     ranks = np.argsort(np.argsort(numbers))

@@ -108,8 +108,10 @@ class Walk(Logic):
         return operation(*parts)
 
     def comparison(self, node: ast.Compare) -> Condition:
-        """Where all links of a < b <= c hold. Raises ExpressionError for a sign that the language
-        lacks."""
+        """Where all links of a < b <= c hold.
+
+        Raises ExpressionError for a sign that the language lacks.
+        """
         if any(type(sign) not in self.signs for sign in node.ops):
             refuse(node, f"compare with {', '.join(SIGNS[sign] for sign in self.signs)}")
         sides = [(side, self.side(side)) for side in (node.left, *node.comparators)]

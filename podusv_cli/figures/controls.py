@@ -62,10 +62,10 @@ def controls(runs: Sequence[Shown], columns: int) -> Figure:
 def _cells(
     figure: Figure, shape: tuple[int, int], parts: Sequence[str], columns: int
 ) -> NDArray[Any]:
-    """Panels (loads, kinds, parts): parts of the run side by side, or above each other in one
-    column.
+    """Panels (loads, kinds, parts): parts of the run side by side, or one above the other.
 
-    `shape` is how many loads and kinds there are; `parts` are the names of the parts.
+    They stand above each other where the page has one column (`columns`). `shape` is how many loads
+    and kinds there are; `parts` are the names of the parts.
     """
     (loads, kinds), count = shape, len(parts)
     if columns == 2:

@@ -194,8 +194,10 @@ def draw_run_curve(
 
 
 def compress(axes: Axes, runs: Sequence[Shown], name: str) -> None:
-    """Make the vertical axis logarithmic beyond a signal's usual values where its peaks
-    dwarf them."""
+    """Make the vertical axis logarithmic beyond usual values where peaks dwarf them.
+
+    `name` is the signal; `axes` has its curves already.
+    """
     linear = linear_up_to(runs, name, max(abs(limit) for limit in axes.dataLim.intervaly))
     if linear:
         axes.set_yscale("symlog", linthresh=linear)

@@ -83,12 +83,11 @@ def draw_in_parallel(
     progress: Progress = lambda fraction: None,
     workers: int = 0,
 ) -> dict[str, bytes]:
-    """The files of `draw` by name, drawn in processes of their own, each of which draws several
-    figures.
+    """The files of `draw` by name, drawn in processes of their own.
 
-    A figure that fails is noted in `extras`. `progress` is called with the fraction of figures that
-    are over. `workers` is how many processes draw at a time (0: one a core). Raises
-    KeyboardInterrupt where one was interrupted.
+    Each process draws several figures. A figure that fails is noted in `extras`. `progress` is
+    called with the fraction of figures that are over. `workers` is how many processes draw at a
+    time (0: one a core). Raises KeyboardInterrupt where one was interrupted.
     """
     sheets = tuple(sheets)
 

@@ -119,8 +119,10 @@ def _fresh(measured: Vector) -> NDArray[np.intp]:
 
 
 def _shade(panels: Sequence[Axes], runs: Sequence[Shown], place: int) -> None:
-    """Shade the outages of the sensor of a quantity, by its `place` in STATE, in any of
-    the runs."""
+    """Shade the outages of a quantity's sensor in any of the runs.
+
+    `place` is the quantity's in STATE.
+    """
     start, end = min(run.start for run in runs), max(run.end for run in runs)
     spans = {
         (max(first, start), min(last, end))

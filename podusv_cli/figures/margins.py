@@ -17,8 +17,7 @@ CURVES = {"S": "sensitivity |S|", "T": "complementary sensitivity |T|"}
 
 
 def sensitivities(laws: Mapping[str, LoopMargins], columns: int = 2) -> Figure:
-    """|S| and |T| over frequency: a row of panels each, a column for each loop, a curve for each
-    law.
+    """|S| and |T| over frequency: a row of panels each, a column a loop, a curve a law.
 
     `laws` are by label; one without a loop has no curve there. `columns` is the width of the
     figure.

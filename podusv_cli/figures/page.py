@@ -62,8 +62,10 @@ class Page(Figure):
         super().draw(renderer)
 
     def resize(self, width: float, height: float) -> None:
-        """Give the page another size [inches]; its legends get as many rows as the new width asks
-        for."""
+        """Give the page another size [inches].
+
+        Its legends get as many rows as the new width asks for.
+        """
         self.set_size_inches(width, height)
         keys, self.keys = self.keys, []
         for legend in list(self.legends):

@@ -49,8 +49,10 @@ def pods(runs: Sequence[Shown], columns: int) -> Figure:
 
 
 def _draw(axes: Axes, run: Shown, names: tuple[str, str], pod: int, *, fitted: bool) -> None:
-    """Draw what one pod (from 0) does, and thin what it is asked for; `names` are
-    (actual, asked)."""
+    """Draw what one pod (from 0) does, and thin what it is asked for.
+
+    `names` are (actual, asked).
+    """
     actual, asked = names
     thin: dict[str, Any] = {**run.line_style, **THIN, "label": f"_{run.name}, {asked}"}
     if _has(run, asked, pod):

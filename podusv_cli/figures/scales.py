@@ -61,10 +61,10 @@ def mean_size(run: Shown, name: str) -> float:
 
 
 def smallest_distance(runs: Sequence[Shown]) -> float:
-    """The smallest distance [m] worth showing: the way of a step, or less where a vessel stays
-    nearer.
+    """The smallest distance [m] worth showing.
 
-    How near a vessel comes in passing depends on where the steps happen to fall.
+    It is the way of a step, or less where a vessel stays nearer. How near a vessel comes in passing
+    depends on where the steps happen to fall.
     """
     return min(
         _smallest_distance_of(run) for run in runs if run.has("u")

@@ -63,8 +63,11 @@ def _draw(axes: Axes, run: Shown, name: str, **look: Any) -> Line2D:
 
 
 def _scales(axes: Axes) -> None:
-    """Make both axes logarithmic, DECADES below the largest harmonic and up to the last one above
-    that."""
+    """Make both axes logarithmic, and cut off small harmonics.
+
+    The vertical axis begins DECADES below the largest harmonic; the other ends at the last harmonic
+    above that.
+    """
     curves = [np.array(line.get_data()) for line in axes.lines]
     top = max((float(np.max(rms, initial=0.0)) for _, rms in curves), default=0.0)
     if np.isfinite(top) and top > 0.0:

@@ -37,8 +37,10 @@ class Target:
         return not self.runs[0].about.trial
 
     def track(self, span: Span = (0.0, np.inf)) -> tuple[Vector, Vector]:
-        """East and north (n,) [m] during a time [s]; all legs of a path, the run's track in a
-        trial."""
+        """East and north (n,) [m] of the target during a time [s].
+
+        That is all legs of a path, and the track of the run in a trial.
+        """
         if self.in_sight and not self.is_ahead:
             north, east = np.array(self.runs[0].about.waypoints).T
             return east, north

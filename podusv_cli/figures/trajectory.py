@@ -112,8 +112,7 @@ def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
 def _sheet(
     asides: int, distances: bool, columns: int, shape: float
 ) -> tuple[Page, Axes, list[Axes], Axes | None]:
-    """A figure with a map, `asides` close-ups, and a panel of distances where asked for (else
-    None).
+    """A figure with a map, `asides` close-ups, and a panel of distances or None.
 
     `shape` is the map's width over its height: it stands beside the rest, or, where it is wide,
     above it. `columns` is the width in columns of a page.
@@ -252,8 +251,7 @@ class View:
 
 
 def views(runs: Sequence[Shown]) -> list[View]:
-    """The close-ups: where runs that finished are farthest apart, if anywhere, and their common
-    end.
+    """The close-ups: where finished runs are farthest apart, if anywhere, and their end.
 
     Hulls are shown at one and the same time. Of several targets, the first with its runs. On a path
     that is followed, runs are at other places at one time: shown is the largest deviation from it.
@@ -270,8 +268,10 @@ def views(runs: Sequence[Shown]) -> list[View]:
 
 
 def _at_once(name: str, t: float, runs: Sequence[Shown], target: Target, middle: Vector) -> View:
-    """The view of the runs at a time `t` [s], about `middle` (2,) [m], with the tracks
-    around it."""
+    """The view of the runs at a time `t` [s], with the tracks around it.
+
+    `middle` (2,) is the view's centre: east and north [m].
+    """
     last = min(run.counts_to for run in runs)
     span = t - LAST_PART * last, min(t + LAST_PART * last, last)
     at = np.array([[run.at(t, name) for name in ("y", "x")] for run in runs])
@@ -311,8 +311,10 @@ def _is_on_leg(run: Shown, last: float) -> npt.NDArray[np.bool_]:
 
 
 def _farthest_apart(runs: Sequence[Shown], target: Target, last: float) -> list[View]:
-    """The view of the runs when they fill the largest box, up to `last` [s]; none if that is at the
-    end."""
+    """The view of the runs when they fill the largest box, up to `last` [s].
+
+    Empty if that is at the end, which has a view of its own.
+    """
     times = np.linspace(min(run.start for run in runs), last, INSTANTS)
     logs = [run.recording for run in runs]
     tracks = np.array(

@@ -132,8 +132,10 @@ def _late(missed: bool) -> str:
 
 
 def _unable(scenario: Scenario) -> list[str]:
-    """Why a law cannot arrive, in sentences: its own limits, or the hull's speed; none
-    if it can."""
+    """Why a law cannot arrive, in sentences: its own limits, or the hull's speed.
+
+    Empty if it can.
+    """
     facts, law = scenario.facts, scenario.controller
     speed = median(reference(scenario).speed)
     own = [

@@ -106,8 +106,10 @@ sampled_adaptation, sampled_derivative, sampled_loop = map(_sampling_finding, LO
 
 
 def _margin(case: Case) -> float:
-    """The delay margin of all demands [s]; NaN where there is no steady motion, or it
-    is unstable."""
+    """The delay margin of all demands [s].
+
+    NaN where there is no steady motion, or it is unstable.
+    """
     try:
         compiled = case.scenario.simulation.compiled
         margins = loop_margins(case.plan.loop, case.plan.grid, compiled=compiled)

@@ -48,8 +48,10 @@ def sampled_growth(loop: Loop, step: float, count: int, *, update_first: bool = 
 
 
 def _updated_first(loop: Loop, step: float, count: int) -> float:
-    """The same as `sampled_growth` where m' = F (e_held, m) comes first, then e' = -d e + g .
-    (e_held, m)."""
+    """`sampled_growth` where the law's memory is updated before the error is held.
+
+    m' = F (e_held, m) comes first, then e' = -d e + g . (e_held, m).
+    """
     rates = np.vstack([np.zeros(1 + len(loop.memory)), loop.memory])
     updated = np.linalg.matrix_power(_rk4(rates, step), count)
     of_step = _rk4(np.array([[-loop.damping, 1.0], [0.0, 0.0]]), step)
@@ -116,8 +118,10 @@ def _radius(matrix: Vector) -> float:
 
 
 def axes(scenario: Scenario, nu: Vector) -> tuple[Axis, Axis]:
-    """Surge and yaw at the velocity nu (3,) = (u, v, r): inertias, and damping by central
-    differences."""
+    """Surge and yaw at the velocity nu (3,) = (u, v, r) [m/s, m/s, rad/s].
+
+    Each has its inertia, true and nominal, and its damping, by central differences.
+    """
     k, (u, v, r), small = bundle(scenario.vessel.constants()), nu.tolist(), 1e-4
     # Steps of 1e-4 m/s and rad/s are large beside rounding, small beside what damping bends in.
     surge = surge_force(u - small, v, r, k) - surge_force(u + small, v, r, k)

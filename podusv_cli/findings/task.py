@@ -208,8 +208,10 @@ def sliding_distance(case: Case, approach: Approach, damping: float) -> float:
 
 
 def _damping(case: Case, drive: float) -> tuple[float, float]:
-    """Sway damping [kg/s] at the steady sway, and the sway [m/s] where growth by `drive` [kg/s]
-    stops."""
+    """Sway damping [kg/s] at the steady sway, and the sway [m/s] where growth stops.
+
+    The growth is by `drive` [kg/s].
+    """
     k, sway = bundle(case.scenario.vessel.constants()), case.reference.steady_sway
     u = median(case.reference.speed)
     at_rest, small = sway_force(u, sway, 0.0, k), 1e-4

@@ -156,8 +156,7 @@ def _points(case: Case) -> Sentences:
 
 
 def _start(case: Case) -> Sentences:
-    """A finding where the start is nowhere near the target, or the points are a map's
-    coordinates."""
+    """A finding where the start is far from the target, or points are a map's coordinates."""
     start, path, length = case.scenario.start, case.scenario.path, case.scenario.vessel.length
     if not case.scenario.controller.aims():
         return

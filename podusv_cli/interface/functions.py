@@ -339,8 +339,10 @@ def _open_member(member: Member) -> Run:
 
 
 def _runs_compared(done: comparing.Compared, scenarios: Mapping[str, Scenario]) -> dict[str, Run]:
-    """The runs of a comparison that have a log, by label; `scenarios` are those of runs
-    made now."""
+    """The runs of a comparison that have a log, by label.
+
+    `scenarios` are those of runs made now.
+    """
     result = done.result
     return {
         run.label: Run(

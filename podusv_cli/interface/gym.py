@@ -46,14 +46,12 @@ Observe = Callable[[Moment], Any]
 
 
 def demands(task: EpisodeTask) -> Any:
-    """The space of actions: demands within the limits, (tau_u [N], tau_r [N m]), maybe
-    tau_v [N]."""
+    """The space of actions: (tau_u [N], tau_r [N m]), maybe with tau_v [N], within limits."""
     return Box(-task.limits, task.limits, dtype=np.float64)
 
 
 def observations(task: EpisodeTask) -> Any:
-    """The space of observations: the usual eight numbers, or as many as the user's
-    function gives."""
+    """The space of observations: eight numbers, or as many as the user's function gives."""
     most = task.observed_bounds()
     return Box(-most, most, dtype=np.float64)
 
@@ -150,8 +148,10 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
         return task.observation(self._now), reward, dead, cut, {"time": after.time}
 
     def _reward_grown(self, alive: bool) -> float:
-        """What the metric grew by in this period, with a minus; `alive` if all numbers
-        are finite."""
+        """What the metric grew by in this period, with a minus.
+
+        `alive` if all numbers are finite.
+        """
         session, task, before = self.session, self._task, self._gathered
         self._gathered = session.metric(task.metric)
         task.check_reward(self._gathered, alive, session.observe().time)
@@ -255,8 +255,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         return rewards
 
     def _rewards(self) -> Vector:
-        """Rewards (environments,): what the metric grew by since it was asked last,
-        with a minus."""
+        """Rewards (environments,): minus what the metric grew by since the last call."""
         rewards = np.zeros(self.num_envs)
         for march in self._marches:
             gathered = self._metrics.one(self._task.metric, march.gathered_so_far())
@@ -266,10 +265,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         return rewards
 
     def _begin_runs(self, places: Sequence[int], seeds: Sequence[int | None]) -> list[SteppedBatch]:
-        """Begin runs in the environments `places`, sorted into marches of as many as go side by
-        side.
+        """Begin runs in the environments `places`, and return the marches they are sorted into.
 
-        `seeds` are numbers of draws, None for a draw that no study has.
+        A march has as many runs as go side by side. `seeds` are numbers of draws, None for a draw
+        that no study has.
         """
         groups, advance = [], self._sorter.advance
         assert advance is not None
@@ -287,8 +286,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         return begun
 
     def _look(self, march: SteppedBatch) -> None:
-        """Take in the next instant of a march's runs; a terminated run keeps its last finite
-        numbers."""
+        """Take in the next instant of a march's runs.
+
+        A terminated run keeps its last finite numbers.
+        """
         places = np.array(march.places)[march.alive]
         self._parts[:, places] = march.view()[:, march.alive]
         self._times[places], self._ends[march.places] = march.time, march.times()

@@ -152,8 +152,10 @@ class EpisodeTask:
         return np.array([_finite(part, shape, "observe", now.time) for part in parts])
 
     def _check_reward(self, reward: str) -> str:
-        """The reward's metric, if it is gathered during a run. Raises UsageError for any other
-        name."""
+        """The reward's metric, if it is gathered during a run.
+
+        Raises UsageError for any other name.
+        """
         known = gathered_metrics(self.scenario)
         if reward in self.scenario.known_metrics() and reward not in known:
             raise UsageError(
@@ -222,10 +224,10 @@ class EpisodeTask:
         return number
 
     def draw_scenario(self, seed: int | None, random: np.random.Generator) -> Scenario:
-        """The scenario with the draw of a study whose number is `seed`; without one, a draw of no
-        study.
+        """The scenario with the draw of a study whose number is `seed`.
 
-        Draws of no study are independent, also where those of the study are Sobol' points.
+        Without one, a draw of no study. Draws of no study are independent, also where those of the
+        study are Sobol' points.
         """
         if seed is not None:
             return draw_scenario(

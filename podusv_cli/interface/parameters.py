@@ -81,8 +81,10 @@ def scenarios(scenario: Scenario, given: Columns) -> list[Scenario]:
 
 
 def _steps(scenario: Scenario, name: str) -> Route:
-    """The steps of a key that may differ between runs of a batch. Raises ParameterError
-    for others."""
+    """The steps of a key that may differ between runs of a batch.
+
+    Raises ParameterError for others.
+    """
     key = bracketed_key(name)
     steps = route(key)
     section = str(steps[0]) if steps else ""

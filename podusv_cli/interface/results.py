@@ -304,8 +304,7 @@ def _family(runs: Mapping[str, Run], names: Sequence[str], shown: Sequence[Shown
 
 
 def _html(lines: list[str], runs: Mapping[str, Run], table: str) -> str:
-    """Lines of text over a picture of the trajectories, where there are any, and a
-    table in HTML."""
+    """Lines of text over a picture of the trajectories, if any, and a table (HTML)."""
     said = "".join(f"<div>{escape(line)}</div>" for line in lines if line)
     drawable = {label: run for label, run in runs.items() if len(run.recording["time"]) > 1}
     picture = _picture(drawable) if drawable else ""

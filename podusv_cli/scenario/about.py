@@ -83,8 +83,10 @@ def _values(scenario: Scenario) -> dict[str, Any]:
 
 
 def _of_parts(scenario: Scenario) -> dict[str, Any]:
-    """What figures and claims need of hull, path, actuator and sensors: lengths [m], limits,
-    outages [s]."""
+    """What figures and claims need of hull, path, actuator and sensors.
+
+    Lengths, waypoints and circles are in [m], outages in [s].
+    """
     vessel, path, actuator = scenario.vessel, scenario.path, scenario.actuator
     return {
         "length": vessel.length,

@@ -33,8 +33,10 @@ class ValueRefused(PodusvError):
 
 @lru_cache(maxsize=1024)
 def steps_at(key: str) -> Route:
-    """The steps of a key as `route` gives them; remembered, as every draw asks for the
-    same keys."""
+    """The steps of a key as `route` gives them.
+
+    They are remembered, as every draw asks for the same keys.
+    """
     return route(key)
 
 
@@ -119,8 +121,10 @@ def with_values(scenario: Scenario, new: Mapping[Route, Any]) -> Scenario:
 
 
 def _section(scenario: Scenario, section: str, new: Mapping[Route, Any]) -> Any:
-    """A section with new values, checked by its own model; `new` has their steps below
-    the section."""
+    """A section with new values, checked by its own model.
+
+    `new` has their steps below the section.
+    """
     old = getattr(scenario, section)
     if not isinstance(old, tuple):
         return _part(scenario, (section,), old, new)

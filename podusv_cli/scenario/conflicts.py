@@ -120,8 +120,10 @@ def _conflicts_of_laws(scenario: Scenario) -> Conflicts:
 
 
 def _times(scenario: Scenario, of_laws: Mapping[str, float]) -> Conflicts:
-    """Times [s] that are no whole number of steps; `of_laws` are those of the laws, by
-    their keys."""
+    """Times [s] that are no whole number of steps.
+
+    `of_laws` are those of the laws, by their keys.
+    """
     step = scenario.simulation.step
     times = {
         "simulation.duration": scenario.simulation.duration,
@@ -150,8 +152,7 @@ def _samples(period: float, sampled: Mapping[str, float]) -> Conflicts:
 
 
 def _seeing(scenario: Scenario) -> Conflicts:
-    """Sensors and disturbances that do not fit step or vessel; an estimator without
-    what it needs."""
+    """Sensors and disturbances that do not fit step or vessel, and estimators that lack a part."""
     step = scenario.simulation.step
     for at, part in scenario.disturbances().items():
         yield from ((f"{at}.{key}", text) for key, text in part.conflicts(scenario.vessel, step))
@@ -165,8 +166,7 @@ def _seeing(scenario: Scenario) -> Conflicts:
 
 
 def _unmet(scenario: Scenario) -> Conflicts:
-    """Sentences on what laws need of path, actuator or estimator that these do not
-    have, each once."""
+    """Sentences on what laws need that path, actuator or estimator lack, each once."""
     laws, path, actuator = scenario.laws().values(), scenario.path, scenario.actuator
     # The place of the load in an estimator's memory; 0 where none estimates it.
     load_at = 0 if scenario.measurement.is_exact else scenario.estimator.load_at

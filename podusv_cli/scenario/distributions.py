@@ -137,8 +137,10 @@ def _check_order(name: str, bounds: tuple[float, ...]) -> None:
 
 
 def _corners(name: str, corners: tuple[float, ...]) -> None:
-    """Raises ValueError unless low <= mode <= high and low < high; `name` is the key in
-    messages."""
+    """Raises ValueError unless low <= mode <= high and low < high.
+
+    `name` is the key in messages.
+    """
     low, mode, high = corners
     _check_order(name, corners)
     if not low <= mode <= high:
@@ -178,8 +180,10 @@ def _log_uniform(bounds: Interval, u: Vector) -> Numbers:
 
 
 def _triangular(corners: tuple[float, float, float], u: Vector) -> Numbers:
-    """A number for each `u` (n,) in [0, 1) by the inverse of the triangle's
-    distribution function."""
+    """A triangular number for each `u` (n,) in [0, 1).
+
+    It is the inverse of the distribution function at `u`. `corners` are low, mode and high.
+    """
     low, mode, high = corners
     width, rise, fall = high - low, mode - low, high - mode
     # Each branch is a square root: the density rises and falls linearly.

@@ -190,10 +190,9 @@ class Key:
         )
 
     def item(self, step: str | int) -> Key | None:
-        """The item of a list at position `step`, or the entry of a mapping of that name; None if
-        neither.
+        """The item of a list at position `step`, or the entry of a mapping of that name.
 
-        NUMBER and NAME stand for any position and any name.
+        None if the key is neither. NUMBER and NAME stand for any position and any name.
         """
         is_position = isinstance(step, int) or step == NUMBER
         for member in members(self.annotation):

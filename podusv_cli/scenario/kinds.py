@@ -61,8 +61,10 @@ def over(base: Node, own: Node, key: Key) -> Node:
 
 
 def _is_taken(name: str, base: Node, new: Key, key: Key) -> bool:
-    """Whether the kind `new` takes the value `name` of `base`, a section perhaps of
-    another kind."""
+    """Whether the kind `new` takes the value `name` of the section `base`.
+
+    The section may be of another kind; `key` is its key.
+    """
     old = key.kinds.get(base.word("kind"))
     if name == "kind" or not old or old.kind == new.kind:
         return name in new.keys
@@ -74,8 +76,10 @@ def _is_taken(name: str, base: Node, new: Key, key: Key) -> bool:
 
 
 def _lost_keys(base: Node, own: Node, key: Key, at: Route) -> list[str]:
-    """A sentence on values of `base` that the section `own` does not keep, or none; without
-    defaults."""
+    """A sentence on values of `base` that the section `own` does not keep, or an empty list.
+
+    Defaults do not count.
+    """
     old, new = (key.kinds.get(node.word("kind")) for node in (base, own))
     if not old or not new or new.model.stands_alone:
         return []

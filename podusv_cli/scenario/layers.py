@@ -137,10 +137,10 @@ def _mapping(
 
 
 def _named_alike(node: Node, at: Route, faults: list[Fault]) -> Node:
-    """The tree with keys as names in one form, `disturbance[2].seed`, where entries are named by
-    keys.
+    """The tree with keys as names in one form, `disturbance[2].seed`.
 
-    `at` leads to the node. A key that is given in both forms is a fault.
+    That is for sections whose entries are named by keys. `at` leads to the node. A key that is
+    given in both forms is a fault.
     """
     inside = {(*at, key): entry for key, entry in node.mapping.items()}
     for place, entry in inside.items():

@@ -123,8 +123,10 @@ class Loaded:
         return self
 
     def _faults_by(self, check: Check) -> tuple[tuple[str | Route, str], ...]:
-        """What a check finds; remembered, since a study's only cell is checked as the
-        scenario was."""
+        """What a check finds.
+
+        It is remembered, since a study's only cell is checked as the scenario was.
+        """
         if check not in self._faults_found:
             self._faults_found[check] = tuple(check(self))
         return self._faults_found[check]
@@ -140,8 +142,10 @@ class Loaded:
         return self
 
     def merge_over(self, top: Node, checks: Sequence[Check] = ()) -> Scenario:
-        """The scenario of the same tree with the tree `top` merged over it. Raises
-        ScenarioError."""
+        """The scenario of the same tree with the tree `top` merged over it.
+
+        Raises ScenarioError.
+        """
         faults: list[Fault] = []
         root = merge(self.root, without_misfits(self.root, top, faults))
         root = merge_kept(root, keys_of(type(self.scenario)), [])
@@ -239,11 +243,11 @@ def _raise_damage(faults: list[Fault], source: str) -> None:
 def _resolve_plugins(
     root: Node, plugged: Plugged, files: Sequence[str | Plugin], source: str, faults: list[Fault]
 ) -> tuple[Node, Plugins, list[str]]:
-    """The tree with what sections keep of other kinds, its plug-ins, and remarks on what is
-    dropped.
+    """The merged tree, its plug-ins, and remarks on what is dropped.
 
-    `files` are plug-ins of the command line. Raises ScenarioError where a plug-in is at fault:
-    without it, nothing else can be said of the tree.
+    The tree has what sections keep of a base of another kind. `files` are plug-ins of the command
+    line. Raises ScenarioError where a plug-in is at fault: without it, nothing else can be said of
+    the tree.
     """
     before, dropped = len(faults), list[str]()
     root, known = plugged(plugins.with_given(root, files), faults)

@@ -83,8 +83,7 @@ def _is_explained(root: Node, route: Route) -> bool:
 
 
 def _unknown_key(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
-    """A fault for a key that `section` lacks, with the key that may be meant or where
-    it belongs."""
+    """A fault for a key that `section` lacks, with the key that may be meant, or its place."""
     name = str(complaint["loc"][-1])
     route = (*section.path, name)
     node = follow(root, route)[-1]

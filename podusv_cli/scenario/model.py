@@ -220,8 +220,10 @@ class Scenario(Component):
         )
 
     def keys_by_rule(self) -> list[tuple[str | int, ...]]:
-        """The steps of every key whose number `in_numbers` gave, such as ("controllers", "pid",
-        "K_P")."""
+        """The steps of every key whose number `in_numbers` gave.
+
+        An example is ("controllers", "pid", "K_P").
+        """
         seas = self.disturbance
         parts: list[tuple[tuple[str | int, ...], Component]] = [
             (("path",), self.path),

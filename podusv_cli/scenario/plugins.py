@@ -60,8 +60,10 @@ def _node_of(file: str | Plugin) -> Node:
 
 
 def _list_entries(own: Node) -> list[tuple[Node, Node]]:
-    """The name of each plug-in and what is required of it; `plugins` is a list, a mapping or one
-    name."""
+    """The name of each plug-in and what is required of it.
+
+    `plugins` is a list, a mapping or one name.
+    """
     if isinstance(own.content, dict):
         marks = ((name, node.key_mark or node.mark) for name, node in own.content.items())
         return [(Node(name, mark, text=name), own.content[name]) for name, mark in marks]
@@ -124,8 +126,7 @@ def _is_foreign(mark: Mark) -> bool:
 
 
 def _resolved_entry(plugin: Plugin, mark: Mark, given: Node | None = None) -> Node:
-    """The plug-in's entry in resolved.yaml: what the scenario requires (`given`), version and
-    digest."""
+    """The plug-in's entry in resolved.yaml: what is required (`given`), version and digest."""
     entry = given or Node({}, mark)
     for name in ("version", "sha256"):
         text = getattr(plugin, name)

@@ -54,10 +54,10 @@ class Placing:
         return root.with_entry("origin", self._first) if self._first else root
 
     def points(self, text: str, name: str, key: str, faults: list[Fault]) -> Node:
-        """The points (n, 2) of a file's text, north and east [m], as a node; a `Form` of
-        `named_files`.
+        """The points (n, 2) of a file's text, north and east [m], as a node.
 
-        `name` is the file's, `key` the scenario's key that names it.
+        This is a `Form` of `named_files`. `name` is the file's, `key` the scenario's key that names
+        it.
         """
         try:
             route = route_of(text) or self._rows_as_places(text)
@@ -124,8 +124,10 @@ class Placing:
         return tuple(zip(north.tolist(), east.tolist(), strict=True))
 
     def _take_first(self, place: Pair, name: str) -> Plane:
-        """The plane whose origin is the first waypoint of the first route [deg]; noted
-        for others."""
+        """The plane whose origin is the first waypoint of the first route [deg].
+
+        It is noted for the other routes.
+        """
         # A longitude of 0 to 360 deg becomes one of -180 to 180 deg.
         lat, lon = place[0], place[1] - 360.0 * round(place[1] / 360.0)
         mark = Mark(name)

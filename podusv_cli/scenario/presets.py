@@ -126,10 +126,10 @@ def _sections(root: Node, top: Key, faults: list[Fault]) -> Node:
 
 
 def _without_null(root: Node, section: Route = ()) -> Node:
-    """The tree without nulls that take something out: of entries with names of the user, and
-    sections.
+    """The tree without nulls that take something out.
 
-    `section` leads to `root`. Other nulls stay, as values.
+    These are nulls for sections, and for entries that have names of the user. `section` leads to
+    `root`. Other nulls stay, as values.
     """
     if section not in BESIDE_NAMED or not root.mapping:
         return root

@@ -208,8 +208,7 @@ def _geometries(data: Any) -> Iterator[Mapping[str, Any]]:
 def _line_or_points(
     lines: Sequence[Any], points: Sequence[Any]
 ) -> tuple[Sequence[Any], tuple[str, ...]]:
-    """The first line where there is one, else all points; and what of them is left out,
-    in words."""
+    """The first line where there is one, else all points; and what is left out, in words."""
     if not lines:
         return points, ()
     others = {"lines after the first": len(lines) - 1, "single points": len(points)}
@@ -336,8 +335,10 @@ FORMATS: Mapping[str, Callable[[str], RouteFile]] = {
 
 
 def beyond_earth(pairs: Iterable[Pair]) -> str:
-    """What is wrong with the first place (latitude, longitude) [deg] that is not on
-    earth; else ""."""
+    """What is wrong with the first place (latitude, longitude) [deg] that is not on earth.
+
+    "" if all places are.
+    """
     for lat, lon in pairs:
         if abs(lat) > 90.0:
             # As NMEA writes places: two digits of degrees, then minutes below 60.

@@ -59,12 +59,11 @@ class Benched:
 def bench(
     wanted: Selection, request: Request, progress: Progress | None = None, *, optimum: bool = False
 ) -> Benched:
-    """Simulate every law in every case and write the leaderboard; `optimum` finds that of each
-    case.
+    """Simulate every law in every case and write the leaderboard.
 
-    `progress` is called with what is done and its fraction. Raises UsageError (without CasADi, too,
-    if optima are wanted), ScenarioError, LawError before anything is simulated, StorageError, and
-    KeyboardInterrupt; then nothing is written.
+    `optimum` finds that of each case. `progress` is called with what is done and its fraction.
+    Raises UsageError (without CasADi, too, if optima are wanted), ScenarioError, LawError before
+    anything is simulated, StorageError, and KeyboardInterrupt; then nothing is written.
     """
     if optimum:
         # So that a missing library is told before hours of runs.

@@ -45,10 +45,10 @@ class CapabilityOfScenario:
         return [head, *map(list, zip(self.degrees, *columns, strict=True))]
 
     def least(self) -> dict[str, tuple[float, float]]:
-        """By thrusters: the load that is held from every direction, and the direction [deg] that
-        limits it.
+        """The load that is held from every direction, and the direction [deg] that limits it.
 
-        Of several directions, the first that is as low within the solver's accuracy.
+        They are listed by thrusters. Of several directions, the first that is as low within the
+        solver's accuracy.
         """
         least = {name: float(sizes.min()) for name, sizes in self.found.held.items()}
         first = {

@@ -116,8 +116,10 @@ def compare(items: Sequence[Path], request: Request, progress: Progress | None =
 
 
 def _to_doubt(items: Sequence[Path], request: Request) -> Loaded:
-    """The scenario whose verdicts are doubted, checked. Raises UsageError unless it is the only
-    item."""
+    """The scenario whose verdicts are doubted, checked.
+
+    Raises UsageError unless it is the only item.
+    """
     from podusv_cli.doubt.check import doubt_faults  # slow to import, as much of podusv's studies
     from podusv_cli.workflows.doubt import comparison
 
@@ -141,10 +143,10 @@ def compare_gathered(
     progress: Progress | None = None,
     loaded: Loaded | None = None,
 ) -> Compared:
-    """As `compare`, for what is gathered already; `items` are the files and folders that it is
-    from.
+    """Compare what is gathered already, as `compare` does.
 
-    `loaded` is the scenario whose verdicts are doubted, if any.
+    `items` are the files and folders that it is from. `loaded` is the scenario whose verdicts are
+    doubted, if any.
     """
     check_asked(request, [member.plugins for member in given.members])
     _check_metrics(request, given.members)
@@ -311,8 +313,10 @@ def collect(
 
 
 def _place_measured(members: Sequence[Member], runs: Sequence[PastRun]) -> list[Member]:
-    """The members, with a measured track placed beside the first run, and remarks on
-    how they fit."""
+    """The members, with a measured track placed beside the first run.
+
+    The track's remarks say how it fits.
+    """
     logs = {run.label: run.recording for run in runs if len(run.recording["time"])}
     done = [_done_after(m.about, logs[m.label]) for m in members if m.label in logs]
     placed = []
@@ -342,8 +346,10 @@ def _as_finished_runs(members: Sequence[Member], runs: Sequence[PastRun]) -> lis
 
 
 def _with_departures(runs: Sequence[PastRun], members: Sequence[Member]) -> list[PastRun]:
-    """The runs, the simulated ones with their distances from the measured track, if
-    there is one."""
+    """The runs, with distances from the measured track, if there is one.
+
+    Only simulated runs have these distances.
+    """
     measured = {m.label: m.track for m in members if m.track}
     return [
         replace(run, cost={**run.cost, **track.departures(run.counted_recording)})

@@ -121,13 +121,13 @@ def execute(
     watch: Stopwatch | None = None,
     case: Case | None = None,
 ) -> Finished:
-    """Simulate, measure, write and draw a run; the folder `target` appears only when all is
-    written.
+    """Simulate, measure, write and draw a run.
 
-    `case` is the task's scenario with its plan, where it was looked at before; `watch` adds up the
-    time of each part. A run that diverges or is interrupted is written like any other; its status
-    says so. An interrupt after the simulation costs the figures or the law's cost, nothing else.
-    What fails after the simulation is left out, and missing.json says why. Raises StorageError.
+    The folder `target` appears only when all is written. `case` is the task's scenario with its
+    plan, where it was looked at before; `watch` adds up the time of each part. A run that diverges
+    or is interrupted is written like any other; its status says so. An interrupt after the
+    simulation costs the figures or the law's cost, nothing else. What fails after the simulation is
+    left out, and missing.json says why. Raises StorageError.
     """
     watch, case = watch or Stopwatch(), case or Case.of(task.scenario)
     size = estimate(case.scenario, case.plan)
@@ -251,8 +251,10 @@ def simulate_case(
 
 
 def check_figures(scenario: Scenario) -> None:
-    """Raise LawError where a plug-in's figure has the name of another, before anything is
-    simulated."""
+    """Raise LawError where a plug-in's figure has the name of another.
+
+    This is asked before anything is simulated.
+    """
     if scenario.plugged:
         from podusv_cli.figures.drawing import figures_with  # matplotlib is slow to import
 
@@ -308,11 +310,11 @@ def add_derived(
 def _write_log(
     writer: folder.RunWriter, case: Case, recording: Recording, *, again: bool
 ) -> Recording:
-    """Write log and scenario; returns the recording, if `again` with its signals as read from the
-    log.
+    """Write log and scenario, and return the recording.
 
-    There each signal is in one piece. The march leaves them row by row, so that reading one signal
-    of a long log would read all others from the disk, too.
+    If `again`, its signals are as read from the log, where each is in one piece. The march leaves
+    them row by row, so that reading one signal of a long log would read all others from the disk,
+    too.
     """
     from podusv_cli.storage import log, log_reader  # h5py is slow to import
 

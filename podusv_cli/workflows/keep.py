@@ -32,8 +32,10 @@ def scenario_of_draw(plan: StudyPlan, law: str, cell: int, draw: int) -> Scenari
 
 
 def seen_from(place: Path, study: Path, scenario: Scenario) -> Scenario:
-    """A scenario of the study in `study`, with its plug-in files named as from the
-    folder `place`."""
+    """A scenario of a study, with its plug-in files named as from the folder `place`.
+
+    `study` is the folder of the study, which keeps the files.
+    """
     kept = scenario.plugin_files()
     names = {name: relative_path(study / name, place) for name in kept}
     plugins = {names.get(name, name): required for name, required in scenario.plugins.items()}

@@ -115,8 +115,10 @@ class Live:
         return [f"controllers={json.dumps({label: plain(loaded.root.mapping['controller'])})}"]
 
     def singles(self, scenario: Scenario) -> dict[str, Scenario]:
-        """The scenario of each law that is shown, by label. Raises UsageError for an
-        unknown law."""
+        """The scenario of each law that is shown, by label.
+
+        Raises UsageError for an unknown law.
+        """
         known = scenario.singles()
         for law in self.laws:
             if law not in known:
@@ -244,8 +246,10 @@ class Live:
         return told | {"cpu": time.thread_time() - began}
 
     def _recordings(self, cases: Mapping[str, Case], rest: bool) -> dict[str, Recording]:
-        """A run of each law by label, several at once; one whose own values did not move keeps its
-        run."""
+        """A run of each law by label, several at once.
+
+        A law whose own values did not move keeps its run.
+        """
         compiled = next(iter(cases.values())).scenario.simulation.compiled
         if rest:
             for case in cases.values():
@@ -282,8 +286,7 @@ class Live:
         return {"file": str(page.resolve()), "page": page.read_text("utf-8")}
 
     def _base_of(self, loaded: Loaded) -> Base:
-        """What is reused as long as no word changes: cases, and claims that these laws
-        can answer."""
+        """What is reused as long as no word changes: cases, and claims on these laws."""
         cases = {n: loaded.case(s) for n, s in self.singles(loaded.scenario).items()}
         claims, unread = list[ParsedClaim](), tuple[str, ...]()
         try:
@@ -294,8 +297,10 @@ class Live:
         return Base(cases, claims, unread, "nominal" in loaded.root.mapping, several)
 
     def _moving(self, moved: Moved) -> tuple[Base, dict[str, Case]]:
-        """A case for each law, by label, with the numbers put into one that was loaded with the
-        words."""
+        """The base of the moved words, and a case for each law, by label.
+
+        The moved numbers are put into the cases.
+        """
         words = {k: x for k, x in moved.items() if isinstance(x, str) or _is_loaded(route(k))}
         known = json.dumps(words)
         # Only the last base is kept: words change seldom.
@@ -367,8 +372,7 @@ class Live:
         return self.load({}).scenario.labels()
 
     def save(self, moved: Moved, name: Any) -> dict[str, Any]:
-        """Write what differs into NAME.yaml in this folder; the file, its text and a command for
-        it.
+        """Write what differs into NAME.yaml in this folder; return file, text and a command for it.
 
         It is written only if it loads to the very scenario that is shown. Raises UsageError for a
         bad name, StorageError where the file is there or would load to something else.

@@ -33,8 +33,10 @@ SHOWN_MARGINS = (
 
 
 def claims_about(parsed: Sequence[ParsedClaim], labels: Sequence[str]) -> list[ParsedClaim]:
-    """The claims that name no other runs than `labels`, which may be only a part of the
-    scenario's."""
+    """The claims that name no other runs than `labels`.
+
+    These may be only some runs of the scenario.
+    """
     return [
         claim
         for claim in parsed

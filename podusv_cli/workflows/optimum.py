@@ -133,10 +133,10 @@ def optimum_of(
 
 
 def _guesses(scenario: Scenario) -> dict[str, Motion]:
-    """Runs of the scenario's laws by label, and of velocity_vector, from which the search may
-    begin.
+    """Runs from which the search may begin: of the scenario's laws, and of velocity_vector.
 
-    A law that diverges is left out. Raises LawError, and UsageError where all diverge.
+    They are listed by label. A law that diverges is left out. Raises LawError, and UsageError where
+    all diverge.
     """
     singles = scenario.singles()
     if not any(single.controller.label == BESIDE.label for single in singles.values()):

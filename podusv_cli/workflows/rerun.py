@@ -170,8 +170,7 @@ def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repeti
 
 @contextmanager
 def _passing(request: Request) -> Iterator[Path]:
-    """A folder that is gone afterwards, for runs that are not to be kept; else that of
-    `request.out`."""
+    """The folder to write runs into: that of `request.out`, else one that is removed afterwards."""
     if request.out is not None:
         yield request.out.parent
         return

@@ -97,8 +97,7 @@ def _choices(scenario: Scenario, others: Sequence[str]) -> Iterator[str]:
 
 
 def check_asked(request: Request, plugins: Iterable[Plugins]) -> None:
-    """Raise UsageError for a figure or format that there is not, and for figures that
-    are unwanted."""
+    """Raise UsageError for unknown figures and formats, and for figures that are unwanted."""
     if request.names and not request.figures:
         raise UsageError(f"--figure {request.names[0]} and --no-figures contradict each other")
     if request.names or set(request.formats) != {"png"}:
@@ -111,8 +110,10 @@ def check_asked(request: Request, plugins: Iterable[Plugins]) -> None:
 
 
 def others(loaded: Loaded, label: str = "") -> tuple[str, ...]:
-    """The `controllers` that do not run where nobody chose a law by `label`; none if there is no
-    choice."""
+    """The `controllers` that do not run where nobody chose a law by `label`.
+
+    Empty if there is no choice.
+    """
     several = loaded.scenario.controllers  # one may be the `controller` under a name
     alone = label or list(several.values()) == [loaded.scenario.controller]
     return () if alone else tuple(several)

@@ -44,8 +44,7 @@ class Valid:
     study: Sequence[str] = ()
 
     def lines(self) -> Iterator[str]:
-        """Lines on the scenario: laws and steps, time and memory of a run, its study,
-        its findings."""
+        """Lines on the scenario: laws, steps, time and memory of a run, study, findings."""
         scenario = self.loaded.scenario
         laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps
         yield f"ok ({scenario.name}, {laws}, {steps} steps)"

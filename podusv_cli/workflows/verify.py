@@ -88,8 +88,10 @@ def keep(done: Verification, out: Path, *, force: bool = False) -> None:
 
 
 def _spare(out: Path, force: bool) -> None:
-    """Raise StorageError where `out` holds anything but an earlier verification,
-    without `force`."""
+    """Raise StorageError where `out` holds anything but an earlier verification.
+
+    With `force`, any file may be replaced.
+    """
     if force or not out.exists() or not out.stat().st_size:
         return
     with suppress(StorageError):

@@ -72,8 +72,7 @@ def wanted_optima(
 
 
 def _best(cases: Sequence[BenchCase], runs: Sequence[BenchRun]) -> list[str]:
-    """At most BEGINNINGS laws that reached the target in the first of the cases, least
-    IAE first."""
+    """At most BEGINNINGS laws that reached the target in the first case, least IAE first."""
     done = [run for run in runs if run.place == cases[0].place and run.good]
     return [run.law for run in sorted(done, key=lambda run: run.metrics["iae"])[:BEGINNINGS]]
 
@@ -102,10 +101,10 @@ def least(of: OptimumTask, tell: Callable[[float], None]) -> Least:
 def _search_optimum(
     asked: OptimumProblem, guesses: Mapping[str, Motion], tell: Callable[[float], None]
 ) -> list[Stage]:
-    """Optima on ever finer grids, the finest last. `guesses` are runs of laws to begin from, by
-    name.
+    """Optima on ever finer grids, the finest last.
 
-    The next of STEPS is tried where IPOPT finds nothing. Raises NotConvergedError.
+    `guesses` are runs of laws to begin from, by name. The next of STEPS is tried where IPOPT finds
+    nothing. Raises NotConvergedError.
     """
     *first, last = STEPS
     for step in first:

@@ -41,8 +41,10 @@ def page(
     provenance: Mapping[str, Any],
     optima: Sequence[Least] = (),
 ) -> str:
-    """The page as HTML; `made` is `standing.table` of all runs, `with_optima` where
-    there are any."""
+    """The page as HTML.
+
+    `made` is `standing.table` of all runs, `with_optima` where there are any.
+    """
     laws = list(made.law.unique())
     failed = made[made.status != "finished"]
     counts = {f"{name}s": made[name].nunique() for name in PLACE}
@@ -80,8 +82,11 @@ def _table(made: pd.DataFrame) -> str:
 
 
 def _grids(optima: Sequence[Least]) -> dict[str, Any]:
-    """What the page says of the optima: the coarsest finest step, its largest effect, how many
-    cases."""
+    """What the page says of the optima.
+
+    These are the coarsest of the finest steps [s], the most that a finest grid changed the IAE [m
+    s], and the number of cases.
+    """
     return {
         "step": f"{max(optimum.step for optimum in optima):.2g}",
         "lowered": f"{max(abs(optimum.lowered) for optimum in optima):.1g}",
@@ -105,10 +110,10 @@ def _cells(case: pd.DataFrame, laws: Sequence[str]) -> list[PageCell]:
 
 
 def _cell(ratio: float, why: str) -> PageCell:
-    """A cell of the heat map for a `ratio` of IAE to the best law's; inf is a failure, due to
-    `why`.
+    """A cell of the heat map for a `ratio` of IAE to the best law's.
 
-    The colour goes with the ratio's logarithm, from PALE at 1 to DARK at DARKEST.
+    A failure has inf, and `why` it failed. The colour goes with the ratio's logarithm, from PALE at
+    1 to DARK at DARKEST.
     """
     if not math.isfinite(ratio):
         return PageCell(CROSS, "#f6d5c3", "#7a2b00", why)

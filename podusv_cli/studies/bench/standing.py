@@ -71,8 +71,10 @@ def table(runs: Iterable[BenchRun]) -> pd.DataFrame:
 
 
 def _number(metrics: Mapping[str, float], name: str) -> float:
-    """A metric of a run; for a followed path, what FOLLOWED has in its place; NaN
-    without either."""
+    """A metric of a run, or what FOLLOWED has in its place for a followed path.
+
+    NaN without either.
+    """
     return metrics.get(name, metrics.get(FOLLOWED.get(name, ""), np.nan))
 
 
@@ -225,8 +227,10 @@ def leaderboard(made: pd.DataFrame) -> pd.DataFrame:
 
 
 def leaderboard_rows(made: pd.DataFrame) -> list[list[str]]:
-    """The leaderboard of one vessel as text: its headings, then a row a law; `made` has
-    its rows."""
+    """The leaderboard of one vessel as text: its headings, then a row a law.
+
+    `made` has its rows.
+    """
     board, shown = leaderboard(made), [column for column in columns(made) if column.heading]
     rows = [[str(law), *(column.text(row) for column in shown)] for law, row in board.iterrows()]
     return [["law", *(column.heading for column in shown)], *rows]
@@ -240,8 +244,7 @@ def middle(numbers: Iterable[float]) -> float:
 
 
 def profile(made: pd.DataFrame, law: str, ratios: Vector) -> Vector:
-    """Share of all cases in which the law's IAE is at most `ratios` times the best one; like
-    `ratios`.
+    """Share of cases in which the law's IAE is at most `ratios` (n,) times the best one: (n,).
 
     `made` has the rows of one vessel. The performance profile of Dolan and More (2002): where it
     stays below 1, the law failed in the rest of the cases.

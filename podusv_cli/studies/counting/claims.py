@@ -147,8 +147,10 @@ class _Evaluation(Logic):
 
     @property
     def inside(self) -> float:
-        """The confidence of each interval, by Bonferroni: the claim's statistics share 1 - level
-        equally."""
+        """The confidence of each interval, by Bonferroni.
+
+        The statistics of the claim share 1 - level equally.
+        """
         return 1.0 - (1.0 - self.level) / self.parsed.statistics
 
     @property
@@ -195,8 +197,10 @@ class _Evaluation(Logic):
         return [sample(label, i, used[i]) for i, label in enumerate(self.runs.cells)]
 
     def _used_draws(self, law: str) -> Mask:
-        """The draws of a law that count, True in a mask (cells, draws): all that are made, or,
-        unless `whole`, only those whose run is not broken."""
+        """The draws of a law that count, True in a mask (cells, draws).
+
+        All that are made count, or, unless `whole`, only those whose run is not broken.
+        """
         done = self.runs.done(law)
         return done if self.whole else done & ~self.runs.broken(law)
 

@@ -105,8 +105,10 @@ class OverLaws(OfRuns):
         return self.law(node.args[0].id)
 
     def law(self, label: str) -> str:
-        """The law of this name, also added to `names`. Raises ExpressionError where
-        there is none."""
+        """The law of this name, also added to `names`.
+
+        Raises ExpressionError where there is none.
+        """
         self.names.append(known_name(label, self.runs.laws, "law"))
         return label
 
@@ -119,8 +121,7 @@ class OfOneRun(OfRuns):
     ended: Mask = field(kw_only=True)
 
     def quantity(self, node: ast.expr) -> Vector:
-        """The values of a metric that is written by its name alone, NaN where a run did
-        not finish."""
+        """The values of a metric that is named alone, NaN where a run did not finish."""
         if not isinstance(node, ast.Name):
             refuse(node, "write metrics by their names alone, as in finished and z_e_steady <= 1.5")
         name = known_name(node.id, self.metrics, "metric")

@@ -73,9 +73,11 @@ class RunsTable:
     """runs.h5, open for reading, as `StudyRuns`; arrays are read when they are asked for."""
 
     def __init__(self, path: Path, success: str, known: Known) -> None:
-        """Open `path`. `success` is the condition that makes a run a success, in the language of
-        expressions; `known` has the metrics that it may name. Raises StorageError for a damaged
-        file."""
+        """Open `path`.
+
+        `success` is the condition that makes a run a success, in the language of expressions;
+        `known` has the metrics that it may name. Raises StorageError for a damaged file.
+        """
         self.path, self._known, self._successes = path, known, dict[str, Mask]()
         self._success = parse_success(success, known)
         self._open = ExitStack()
@@ -138,8 +140,10 @@ class RunsTable:
         return np.isin(self.status(law), [STATUSES.index(word) for word in BROKEN])
 
     def success(self, law: str) -> Mask:
-        """Whether a run was a success, a mask (cell, draw); computed once a law, since it is asked
-        often."""
+        """Whether a run was a success, a mask (cells, draws).
+
+        It is computed once a law, since it is asked often.
+        """
         if law not in self._successes:
             successes = judge_success(
                 self._success, self._read(law), self.finished(law), self._known

@@ -52,8 +52,7 @@ class Sample(ABC):
         """
 
     def holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
-        """Whether the comparison holds at both ends of the interval (True), at none (False), else
-        None.
+        """Whether the comparison holds at both ends of the interval, at none, or else (None).
 
         `bound`, `margin` and `level` as in `draws_needed`. None as well where there are no draws.
         """

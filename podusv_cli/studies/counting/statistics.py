@@ -33,8 +33,10 @@ class Interval(NamedTuple):
 
     @classmethod
     def of(cls, row: Any, name: str) -> Self:
-        """The interval of a number in `row`, one row of a table with the columns that `columns`
-        names."""
+        """The interval of the number `name` in a row of a table.
+
+        Its columns are those that `columns` names.
+        """
         return cls(row[name], row[f"{name}_low"], row[f"{name}_high"])
 
     def columns(self, name: str) -> dict[str, Any]:
@@ -72,8 +74,10 @@ class Interval(NamedTuple):
         return " %" if form.endswith("%") else ""
 
     def _texts(self, form: str, infinite: str) -> list[str]:
-        """Estimate, low and high as text; `form` and `infinite` as in `text`, without the % sign
-        itself."""
+        """Estimate, low and high as text.
+
+        `form` and `infinite` as in `text`, without the % sign itself.
+        """
         factor, form = (100.0, form[:-1]) if form.endswith("%") else (1.0, form)
         return [digits(factor * number, form or ".5g", infinite) for number in self]
 
@@ -109,11 +113,11 @@ def share(yes: Any, n: Any, level: float, unknown: Any = 0) -> Interval:
 
 
 def quantile(values: Vector, q: float, level: float) -> Interval:
-    """The q-quantile of `values` (n,), between two of the sorted values; valid for any
-    distribution.
+    """The q-quantile of `values` (n,), between two of the sorted values.
 
-    The estimate is the smallest value that a share q of the values does not exceed. An end is
-    infinite where there are too few values for one. `level` is the confidence, as 0.95.
+    The interval is valid for any distribution. The estimate is the smallest value that a share q of
+    the values does not exceed. An end is infinite where there are too few values for one. `level`
+    is the confidence, as 0.95.
     """
     return quantiles(values, (q,), level)[0]
 
@@ -207,18 +211,21 @@ def pairs(a: Vector, b: Vector, margin: float) -> Pairs:
 
 
 def ratios(a: Vector, b: Vector) -> Vector:
-    """a / b (draws,): 1 where both failed or both are 0, inf where only a failed, 0 where only b
-    did."""
+    """a / b (draws,), defined where runs failed, too.
+
+    Equal values, also two failures or two zeros, have 1. The ratio is inf where only a failed, and
+    0 where only b did.
+    """
     with np.errstate(all="ignore"):
         return np.where(np.equal(a, b), 1.0, np.where(np.isposinf(a), inf, a / b))
 
 
 def draws_for_share(estimate: float, bound: float, level: float) -> int | None:
-    """How many draws it takes until a share's interval leaves out `bound`, if the share stays as it
-    is.
+    """How many draws it takes until a share's interval leaves out `bound`.
 
-    `estimate` and `bound` are shares from 0 to 1, `level` is the confidence. None where no number
-    of draws would do: the estimate lies on the bound, or more than MOST draws are needed.
+    The share is taken to stay as it is. `estimate` and `bound` are shares from 0 to 1, `level` is
+    the confidence. None where no number of draws would do: the estimate lies on the bound, or more
+    than MOST draws are needed.
     """
     from scipy.special import betainc  # slow to import
 

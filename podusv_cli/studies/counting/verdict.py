@@ -62,8 +62,10 @@ class Statistic:
         return f"{self.statistic}{at} = {interval:.4g} ({', '.join(counts)})"
 
     def as_json(self) -> dict[str, object]:
-        """Plain data; what is infinite or undefined is None. A study without a grid has
-        no `cell`."""
+        """Plain data; what is infinite or undefined is None.
+
+        A study without a grid has no `cell`.
+        """
         return {k: _plain(v) for k, v in vars(self).items() if v != "" or k != "cell"}
 
 
@@ -104,8 +106,7 @@ class StudyVerdict(Verdict):
         return "; ".join([*(part.in_words() for part in self.parts), *self.reasons()])
 
     def reasons(self) -> Iterator[str]:
-        """Sentences that a reader needs beside the numbers: level, missing draws, open answer,
-        broken runs."""
+        """Sentences to read beside the numbers: level, missing draws, open answer, broken runs."""
         yield f"intervals at {100 * self._inside:.4g} %"
         if self.preliminary:
             yield f"preliminary: {self.draws} of {self.wanted} draws"

@@ -52,8 +52,10 @@ def about(folder: Path, scenario: Callable[[], Scenario]) -> StudyAbout:
 
 
 def _metrics_measured(folder: Path, seal: str) -> Iterator[str]:
-    """The metrics of the runs in the folder, perhaps more than once; `seal` digests the
-    identity."""
+    """The metrics of the runs in the folder, perhaps more than once.
+
+    `seal` is the digest of the study's identity.
+    """
     if (folder / RUNS).exists():
         yield from RunsTable(folder / RUNS, FINISHED, {}).metrics
     for path in (folder / UNITS).glob("*.unit"):

@@ -58,8 +58,7 @@ def sweep_faults(loaded: Loaded) -> list[tuple[Route, str]]:
 
 
 def unjudged_claims(scenario: Scenario) -> str:
-    """A warning that a study does not judge the scenario's claims about single runs; "" if none is
-    due.
+    """A warning that a study does not judge the scenario's claims about single runs, or "".
 
     None is due where the study has claims or a success of its own: then both are meant, each for
     its command.
@@ -249,11 +248,11 @@ def _are_taken_together(
 
 
 def _rounds(values: Mapping[str, list[Any]]) -> list[dict[str, Any]]:
-    """Draws that have every value of each quantity at least once; all pairings, where these are
-    few.
+    """Draws that have every value of each quantity at least once.
 
-    `values` lists what is tried of each quantity, by name. Two values that each agree with the
-    scenario may contradict each other, so they meet in more than one order.
+    They are all pairings where these are few. `values` lists what is tried of each quantity, by
+    name. Two values that each agree with the scenario may contradict each other, so they meet in
+    more than one order.
     """
     if math.prod(map(len, values.values())) <= MOST_ROUNDS:
         return [dict(zip(values, chosen, strict=True)) for chosen in product(*values.values())]

@@ -338,8 +338,7 @@ def lost_scheduler(error: BaseException) -> StorageError:
 
 
 def _join_units(units: Iterable[Unit]) -> Iterator[str]:
-    """Units as text, those that follow each other joined: `pid[0] draws 0 to 63` (0 is
-    the cell)."""
+    """Units as text, with adjoining ones as one: `pid[0] draws 0 to 63` (0 is the cell)."""
     joined: list[Unit] = []
     for unit in sorted(units):
         last = joined[-1] if joined else None

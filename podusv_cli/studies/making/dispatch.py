@@ -65,8 +65,10 @@ class StudyTally:
 
     @property
     def left(self) -> float:
-        """The time until all runs are made at this rate [s]; infinite while it is too early to
-        tell."""
+        """The time until all runs are made at this rate [s].
+
+        It is infinite while it is too early to say.
+        """
         early = time.monotonic() - self.began < EARLY
         return math.inf if early or not self.rate else (self.wanted - self.made) / self.rate
 
@@ -125,8 +127,10 @@ class _Shares:
     """
 
     def __init__(self, units: Units, done: Done, workers: int) -> None:
-        """`units` are dealt to `workers` processes, several a job where they are short; `done` is
-        told of each."""
+        """`units` are dealt to `workers` processes, several a job where they are short.
+
+        `done` is told of each.
+        """
         self._units, self._done, self._workers = units, done, workers
         self._parts = dict[int, list[tuple[int, StudyPlan, Unit]]]()
         self._again = deque[tuple[int, StudyPlan, Unit]]()
@@ -148,8 +152,10 @@ class _Shares:
         return [first, *islice(self._units, min(TOGETHER - 1, waiting // self._workers))]
 
     def take_outcome(self, number: int, outcome: Outcome) -> None:
-        """Tell the outcome of each unit of the job `number`; a killed job's units are made once
-        more, singly."""
+        """Tell the outcome of each unit of the job `number`.
+
+        A killed job's units are made once more, singly.
+        """
         parts = self._parts.pop(number)
         if outcome.killed and len(parts) > 1:
             self._again.extend(parts)

@@ -72,10 +72,10 @@ def _random(sweep: Sweep, first: int, count: int, stream: str) -> dict[str, Vect
 
 
 def _sobol(sweep: Sweep, first: int, count: int, stream: str) -> dict[str, Vector]:
-    """Sobol' points (count,) in [0, 1) by quantity, each dimension shifted by its own random
-    digits.
+    """Sobol' points (count,) in [0, 1) by quantity, from point number `first` on.
 
-    The shift is a digital one (XOR): it randomizes the points and keeps how evenly they lie.
+    Each dimension is shifted by its own random digits. The shift is a digital one (XOR): it
+    randomizes the points and keeps how evenly they lie.
     """
     from scipy.stats import qmc  # takes 60 MB
 

@@ -87,8 +87,10 @@ def digests(result: UnitResult) -> Any:
 
 
 def _differing(new: UnitResult, earlier: Store, draw: int) -> Iterator[str]:
-    """What the same run (number `draw`) has with other values in `earlier`: names of metrics, or
-    status, until, cause."""
+    """What the same run (number `draw`) has with other values in `earlier`.
+
+    They are names of metrics, or status, until, cause.
+    """
     old = next(
         result
         for result in earlier.results()

@@ -79,8 +79,7 @@ def report(text: str, plugins: Plugins) -> Report:
 
 
 def differing(ours: Report, theirs: Report) -> str:
-    """What differs in a worker's report (`theirs`) from ours, with a remedy; "" where
-    nothing does."""
+    """What differs in a worker's report (`theirs`) from ours, with a remedy, or ""."""
     differences = [
         f"{name} is {theirs.get(name, 'not there')}, not {word}"
         for name, word in ours.items()

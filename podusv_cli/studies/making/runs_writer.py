@@ -115,8 +115,10 @@ def _lay_out(part: Path, study: StudyAbout, identity: str, causes: Causes) -> di
 
 
 def bytes_of(shape: tuple[int, int, int], metrics: int, drawn: int) -> int:
-    """Roughly the size of the table [bytes] for `shape` (laws, cells, draws) and so many metrics
-    and drawn quantities."""
+    """Roughly the size of the table [bytes] for `shape` (laws, cells, draws).
+
+    `metrics` and `drawn` are the numbers of metrics and of drawn quantities.
+    """
     of_a_run = 8 * (metrics + 1) + 1  # with `until` and `status`
     return int(np.prod(shape)) * of_a_run + shape[2] * (4 + 8 * drawn) + HEAD * (metrics + 2)
 

@@ -117,8 +117,10 @@ class SessionLog:
             self._write(earlier)
 
     def end(self, runs: int, facts: Mapping[str, Any] = MappingProxyType({})) -> None:
-        """Note that `runs` runs were made, and further `facts` of the session. Raises
-        StorageError."""
+        """Note that `runs` runs were made, and further `facts` of the session.
+
+        Raises StorageError.
+        """
         times = provenance.times(self._started, datetime.now(UTC))
         self._origin |= {**times, "runs": runs, **facts}
         with sole_writer(self._folder, PROVENANCE, PATIENCE):

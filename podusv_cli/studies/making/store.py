@@ -100,8 +100,10 @@ class Store:
         identity: Mapping[str, Any],
         remedy: str = "name another folder with --out, or begin anew with --force",
     ) -> None:
-        """Raise UsageError where `identity` is not this study's, naming `folder` and
-        the `remedy`."""
+        """Raise UsageError where `identity` is not this study's.
+
+        The message names `folder` and the `remedy`.
+        """
         if different := disagreements(identity, self.about.identity):
             raise UsageError(f"{folder} holds another study: {different}; {remedy}")
 

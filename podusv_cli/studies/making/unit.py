@@ -100,8 +100,7 @@ def make_together(
 
 
 def _loops(plan: StudyPlan, unit: Unit) -> list[Callable[[], ClosedLoop]]:
-    """A function for each of a unit's draws that builds its closed loop; they are built when
-    needed."""
+    """A function for each of a unit's draws that builds its closed loop when called."""
     drawn = drawing(plan.single(unit.law, unit.cell), plan.sweep.vary)
 
     def loop(draw: Draw) -> ClosedLoop:

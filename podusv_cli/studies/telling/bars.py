@@ -47,8 +47,10 @@ def bars(claim: ParsedStudyClaim, verdict: StudyVerdict) -> Iterator[Bar]:
 
 
 def _bar(link: Link, part: Statistic) -> Bar:
-    """The bar of one statistic beside the bound of its comparison; places in percent of
-    the axis."""
+    """The bar of one statistic beside the bound of its comparison.
+
+    Its places are in percent of the axis.
+    """
     shares = isinstance(link.call.func, ast.Name) and link.call.func.id in (SHARE, FAILURES)
     first, last = _axis(link, part, shares=shares)
 

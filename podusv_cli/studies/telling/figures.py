@@ -91,8 +91,7 @@ def _bands(level: float) -> str:
 
 
 def _distribution(results: Results, name: str, cell: int) -> Iterator[Sketch]:
-    """The figure of one metric's distributions in one cell, a curve for each law; none without
-    numbers."""
+    """The figure of one metric in one cell, a curve for each law; none without numbers."""
     values, level = _metric_by_law(results, name, cell), results.level
     if values:
         yield Sketch(
@@ -132,8 +131,7 @@ def _failures(results: Results, cell: int) -> Iterator[Sketch]:
 
 
 def _thresholds(results: Results, cell: int) -> Iterator[tuple[str, float, dict[str, Vector]]]:
-    """Each metric that success limits from above, its limit, and the values (n,) of each law's
-    draws.
+    """Each metric that success limits from above, its limit, and the draws' values (n,) by law.
 
     A run that fails for another reason has infinity. Other parts of the condition give no figure.
     """
@@ -188,8 +186,7 @@ def _heatmaps(results: Results) -> Iterator[Sketch]:
 
 
 def _panel(results: Results, law: str, name: str, across: int) -> Vector:
-    """A number of every cell for one law: the share of failures, or the median of the metric
-    `name`.
+    """The share of failures or the median of metric `name` in every cell, for one law.
 
     Shape (cells / across, across), where `across` is how many values the first key has. A row is a
     combination of all other keys.
@@ -491,8 +488,7 @@ def _pair(pair: pd.Series) -> str:
 
 
 def _write(axes: Axes, panel: Vector, low: float, high: float) -> None:
-    """Write every number of `panel` (rows, columns) into its cell, in a colour that can be read
-    there.
+    """Write every number of `panel` (rows, columns) into its cell, in a readable colour.
 
     `low` and `high` are the ends of the colour scale, whose lower half is dark.
     """

@@ -72,10 +72,9 @@ def write_report(
 
 
 def publish(folder: Path, drawn: dict[str, bytes], page: str | None, extras: Extras) -> None:
-    """Write figures (`drawn`, by name), the report `page` and what is missing, in place of earlier
-    ones.
+    """Write figures (`drawn`, by name), the report `page` and what is missing.
 
-    Without a page (None), an old one is removed.
+    They replace earlier ones. Without a page (None), an old one is removed.
     """
     _replace(folder / FIGURES, drawn)
     _replace(folder, {REPORT: (page or "").encode()} if page else {}, (REPORT,))

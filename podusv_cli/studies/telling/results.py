@@ -118,8 +118,10 @@ class Results:
         return replace(self, parsed=(), verdicts=(), contradicted=contradicted)
 
     def cells(self) -> tuple[list[str], list[list[str]]]:
-        """Head and rows of the answer's table as text: share of failures and medians
-        for every law."""
+        """Head and rows of the answer's table as text.
+
+        A row has the share of failures and the medians of a law (and cell).
+        """
         several, about = (
             len(self.runs.cells) > 1,
             [self.known_metrics[name] for name in self.shown_metrics],
@@ -163,8 +165,10 @@ class Results:
 
 
 def judge_study(about: StudyAbout, runs: RunsTable) -> Results:
-    """All tables and verdicts of a study's runs; without intervals where draws are not
-    independent."""
+    """All tables and verdicts of a study's runs.
+
+    There are no intervals where draws are not independent.
+    """
     level, known = about.level, about.metrics
     parsed = [
         claims.ParsedStudyClaim(name, claim, claims.parse(claim.expect, about.laws, known))

@@ -64,8 +64,7 @@ class SearchDriver:
             self.failure = outcome.failure
 
     def _take(self, search: GainSearch, place: int, result: UnitResult) -> None:
-        """Give a search the result of its trial at `place` of the batch, and queue what it asks for
-        next."""
+        """Give a search the result of its trial at `place`, and queue what it asks for next."""
         self._add(search, search.take_result(place, result))
         self.tally.made += result.unit.count
         self.tally.failed += sum(map(bool, result.causes))

@@ -279,8 +279,10 @@ def slices(
 
 
 def _slice(axes: Axes, gain: Gain, tried: pd.DataFrame, winner: Any) -> None:
-    """Draw the trials over one gain; lines at the gain that was found (`winner`) and the scenario's
-    own."""
+    """Draw the trials over one gain, and lines at the found gain and the scenario's own.
+
+    `winner` is the gain that was found, a number or a word.
+    """
     # Words stand at whole numbers in their order.
     if gain.words:
         places = {word: place for place, word in enumerate(gain.words)}

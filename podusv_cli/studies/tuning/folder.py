@@ -110,8 +110,10 @@ def _identity(plan: TunePlan) -> dict[str, Any]:
 
 
 def _content(plan: TunePlan, history: Sequence[Any], started: str) -> dict[str, Any]:
-    """What tune.json says: the search, its identity, and all calls; `history` are the
-    earlier ones."""
+    """What tune.json says: the search, its identity, and all calls.
+
+    `history` are the earlier ones.
+    """
     tune = plan.tune
     asked = {
         "budget": tune.budget,

@@ -67,8 +67,10 @@ class OfGains(OfRuns):
     names: list[str] = field(default_factory=list)  # of the metrics that were met
 
     def quantity(self, node: ast.expr) -> Vector:
-        """The values (draws,) of a metric that is written by its name alone. Raises
-        ExpressionError."""
+        """The values (draws,) of a metric that is written by its name alone.
+
+        Raises ExpressionError.
+        """
         if not isinstance(node, ast.Name):
             refuse(node, "write metrics by their names alone, as in median(iae)")
         name = known_name(node.id, self.metrics, "metric")

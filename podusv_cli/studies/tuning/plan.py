@@ -148,8 +148,10 @@ class TunePlan:
         return self.base.with_variant(Variant(stream, draws, renamed))
 
     def runs(self, results: list[UnitResult]) -> Outcomes:
-        """The runs of some units of one law, in their order; failed is what the study calls no
-        success."""
+        """The runs of some units of one law, in their order.
+
+        Failed are those that the study does not call a success.
+        """
         import numpy as np
 
         names = dict.fromkeys(name for result in results for name in result.metrics)

@@ -17,8 +17,7 @@ BETTER = 0.8  # of the others' error: a law that ought to be noticed
 
 
 def remarks(results: SearchResults) -> list[str]:
-    """Sentences on the result: the answer, what it depends on, and what a user may want
-    to change."""
+    """Sentences on the result: answer, what it depends on, what a user may want to change."""
     return [
         *_answer(results),
         *_power(results),
@@ -147,8 +146,10 @@ def _few(results: SearchResults) -> Iterator[str]:
 
 
 def _remark_overfitted(results: SearchResults) -> Iterator[str]:
-    """Laws of which another search than the chosen one does better on fresh draws, by
-    over MARGIN."""
+    """Laws of which another search than the chosen one does better on fresh draws.
+
+    The difference is over MARGIN.
+    """
     for law in results.winners:
         reached = results.spread(law)
         taken = reached[results.winners[law].index(results.winner(law))]

@@ -102,8 +102,10 @@ def ratio(row: Any) -> str:
 
 
 def spread(row: Any) -> str:
-    """The objective of the searches' winners: median (least to largest); a dash for a single
-    search."""
+    """The objective of the searches' winners: median (least to largest).
+
+    It is a dash for a single search.
+    """
     middle, low, high = (row[f"repeats_{end}"] for end in ("median", "low", "high"))
     if math.isnan(low) or low == high:
         return "-"

@@ -135,8 +135,10 @@ class SearchResults:
 
     @cached_property
     def pairs_of_laws(self) -> LawRatios:
-        """Every pair of laws by the first metric, over all of their searches and the
-        fresh draws."""
+        """Every pair of laws by the first metric.
+
+        All searches and the fresh draws count.
+        """
         metric = self.shown_metrics[0]
         runs = {}
         for law in self.plan.laws:
@@ -317,10 +319,9 @@ class SearchResults:
         return pd.DataFrame(rows, columns=["law", "gain", "importance", "low", "high"])
 
     def _importances(self, law: str) -> Iterator[dict[str, float]]:
-        """The importances of gains from each search, PARTS times, each without one part of its
-        trials.
+        """The importances of gains, PARTS times for each search.
 
-        Searches with too few trials give none.
+        Each time another part of the trials is left out. Searches with too few trials give none.
         """
         for trials in self.trials[law]:
             for part in range(PARTS):

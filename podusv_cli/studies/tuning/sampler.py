@@ -48,8 +48,10 @@ class Sampler:
         self._study.enqueue_trial({k: v for k, v in own.items() if v is not None})
 
     def ask(self, batch: int, count: int) -> list[dict[str, Any]]:
-        """The gains of `count` trials of batch number `batch` (from 0); the first are the
-        scenario's."""
+        """The gains of `count` trials of batch number `batch` (from 0).
+
+        The first trial of batch 0 has the gains of the scenario.
+        """
         with _quiet():
             self._study.sampler = self._sampler_for(batch)
             self._asked = [self._study.ask() for _ in range(count)]

@@ -95,8 +95,10 @@ class GainSearch:
         return []
 
     def _first_units(self) -> list[tuple[int, StudyPlan, Unit]]:
-        """The units of a batch's first draws; none where the law refuses all gains, and the batch
-        ends."""
+        """The units of a batch's first draws.
+
+        Empty where the law refuses all gains; then the batch ends.
+        """
         draws = self._attempts[0].draws
         # Refused gains fail at once, in both steps.
         units = self._units(min(self.first, draws)) or self._units(draws)
@@ -105,10 +107,9 @@ class GainSearch:
         return units
 
     def _ask(self, left: int) -> None:
-        """Ask for as many trials as the budget has whole ones for; the last one is cut to what is
-        left.
+        """Ask for as many trials as the budget has whole ones for.
 
-        `left` is the budget that is left, in runs.
+        The last one is cut to what is left. `left` is the budget that is left, in runs.
         """
         tune = self.plan.tune
         count, draws = min(tune.batch, left // tune.train), tune.train
@@ -119,8 +120,10 @@ class GainSearch:
         ]
 
     def _attempt(self, gains: dict[str, object], draws: int) -> Attempt:
-        """A trial of these gains, to meet `draws` draws; without a plan where the law
-        refuses them."""
+        """A trial of these gains, to meet `draws` draws.
+
+        It has no plan where the law refuses the gains.
+        """
         taken = with_gains(self.plan.laws[self.law], gains)
         named = {self.law: (self.law, gains)}
         stream = self.plan.stream(self.number)
@@ -168,8 +171,10 @@ class GainSearch:
         return UnitResult(unit, {}, status, nothing, ("the law refuses these gains",) * unit.count)
 
     def take_result(self, place: int, result: UnitResult) -> list[tuple[int, StudyPlan, Unit]]:
-        """Take in the result of the trial at `place`; the units that follow once all of its step
-        are in."""
+        """Take in the result of the trial at `place`, and return the units to make next.
+
+        Units follow once all results of the step are in.
+        """
         self._attempts[place].results.append(result)
         self._waiting -= 1
         return [] if self._waiting else self._next()
@@ -188,8 +193,10 @@ class GainSearch:
         trials.write(self._folder, self.name, self.trials)
 
     def _is_over(self, attempt: Attempt) -> bool:
-        """Whether a trial is pruned: a sound one of earlier batches is far better on the first
-        draws."""
+        """Whether a trial is pruned after the first draws.
+
+        It is if a sound trial of earlier batches is far better on these draws.
+        """
         # The very first batch is never pruned, as nothing is known to compare with.
         if not self.trials or attempt.draws_met < self.first:
             return False

@@ -73,8 +73,10 @@ class Gain:
         return (number - self.low) / (self.high - self.low)
 
     def at(self, place: float) -> Any:
-        """What is at a place between the ends, from 0 to 1, the reverse of `place`; or one of the
-        words."""
+        """The gain at a place between the ends, from 0 to 1, or one of the words.
+
+        It is the reverse of `place`.
+        """
         if self.words:
             return self.words[int(place * len(self.words))]
         if self.log:
@@ -117,8 +119,7 @@ def _numbers(law: Controller) -> Iterator[tuple[str, Any]]:
 
 
 def _is_gain(law: Controller, key: str, scenario: Scenario) -> bool:
-    """Whether a number is a gain: positive, and one that changes numbers of a run, not its
-    structure."""
+    """Whether a number is a gain: positive, and not one that changes a run's structure."""
     own = getattr(law, key)
     if not isinstance(own, float) or own <= 0.0 or key in law.no_gains:
         return False
