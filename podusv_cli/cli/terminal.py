@@ -49,7 +49,10 @@ def echo_json(content: Mapping[str, Any]) -> None:
 
 
 def echo_result(done: Any, report: Callable[[], None], *, as_json: bool, quiet: bool) -> None:
-    """What a command is asked to print of its result: JSON, its folder's path, or a report."""
+    """Print what a command is asked for: its result as JSON, its folder's path, or a report.
+
+    `done` is the result, with `as_json` and `folder`; `report` prints the report.
+    """
     if as_json:
         echo_json(done.as_json())
     elif quiet:
@@ -165,7 +168,10 @@ def _width() -> int:
 
 
 def warn_of_differences(differences: Mapping[str, Mapping[str, Any]]) -> None:
-    """Print on stderr in which keys, besides the controller, compared runs differ."""
+    """Print on stderr in which keys, besides the controller, compared runs differ.
+
+    `differences` has the value of each run, by label, for each key.
+    """
     from podusv_cli.comparison.differences import as_text
 
     if differences:

@@ -32,9 +32,10 @@ def _bits(array: Vector) -> npt.NDArray[np.int64]:
 
 
 def distances(one: Vector, other: Vector, *, period: float = math.inf) -> Vector:
-    """|one - other| in the shape of both, or the shorter way round a `period`.
+    """|one - other| for signals (n,), in the shape of both.
 
-    0 where both are the same to the last bit, infinite where one is not finite.
+    Signals with a `period`, such as headings with 2 pi, have the shorter way round. A distance is 0
+    where both are the same to the last bit, and infinite where one is not finite.
     """
     unequal = differing(one, other)
     with np.errstate(all="ignore"):
@@ -233,8 +234,8 @@ def _first(unequal: list[_Pair]) -> Deviation | None:
 
 
 def _place_of_largest(pair: _Pair) -> Place:
-    # Zeros of different sign differ at a distance of 0.
     """The indices at which two arrays differ most."""
+    # Zeros of different sign differ, at a distance of 0; equal numbers must lie below that.
     distance = distances(pair.one, pair.other, period=pair.period)
     return _place_of_maximum(np.where(differing(pair.one, pair.other), distance, -1.0))
 

@@ -261,7 +261,7 @@ def _places_laws_know(places: Sequence[Place], singles: Singles) -> list[Place]:
 def _values(key: Key, own: Any) -> tuple[Any, ...]:
     """The values to try of a word, switch or count: other words, the next seeds, half and twice.
 
-    None for a real number, which has a range.
+    `own` is the scenario's value. A real number has a range, and thus no values.
     """
     if isinstance(own, bool):
         return (not own,)

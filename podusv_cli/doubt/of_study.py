@@ -86,7 +86,10 @@ def _with_lengths(scenario: Scenario, factor: float) -> str:
 
 
 def overrides(choice: Choice, value: Any, scenario: Scenario) -> list[str]:
-    """What `--set` takes to give a choice another value in the study's scenario."""
+    """What `--set` takes to give a choice another value: KEY=VALUE for each of its places.
+
+    `scenario` is that of the study.
+    """
     if choice.name in (SEED, SUCCESS, "vessel.preset"):
         return [f"{choice.name}={json.dumps(value)}"]
     keys = dict.fromkeys(public(place) for place in choice.places)

@@ -40,7 +40,10 @@ def _by_factor(alone: float, together: float) -> Way:
     """
 
     def range_of_factor(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
-        """Factors of the scenario's value, as far as the key takes both ends; None if it cannot."""
+        """Factors of the scenario's value `own`, for the choice alone and for all together.
+
+        None if the value is 0, or the key's bounds leave no range on one side of 0.
+        """
         ends = [_inside([own / f, own * f], key) for f in (alone, together)]
         if not own or any(low * high <= 0.0 for low, high in ends):
             return None
@@ -59,7 +62,7 @@ def _by_summand(scale: Callable[[Scenario], float], alone: float, together: floa
     """
 
     def range_of_summand(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
-        """Summands to the scenario's value, in shares of `scale`; None where that is 0."""
+        """Summands to the scenario's value `own`, in shares of `scale`; None where that is 0."""
         if not (unit := scale(scenario)):
             return None
         ends = [

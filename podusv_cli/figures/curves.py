@@ -132,9 +132,10 @@ def _same(run: Shown, longest: Shown, name: str) -> bool:
 def draw_run(
     axes: Axes, run: Shown, curve: tuple[Vector, Vector], *, fitted: bool, **look: Any
 ) -> None:
-    """Plot a curve over time as the run's own, with its markers, and what else its look has.
+    """Plot a `curve` (t [s], y), each (n,), in the look of its run, with the run's markers.
 
-    A run that did not finish has an x below the instant of its end; the curve may end anywhere.
+    `look` is added to that of the run; `fitted` is as in `draw_run_curve`. A run that did not
+    finish has an x below the instant of its end; the curve may end anywhere.
     """
     mark(draw_run_curve(axes, run, curve, fitted=fitted, **run.line_style, **look), run)
     if not run.whole and len(curve[0]) and curve[0][-1] == run.end:
@@ -145,7 +146,8 @@ def draw_run(
 def mark(line: Line2D, run: Shown, t: Vector | None = None) -> None:
     """Put the run's markers on a curve, at their places in time.
 
-    `t` are the instants of the curve's points, where these are not its horizontal positions.
+    `t` (n,) [s] are the instants of the curve's points, where these are not its horizontal
+    positions.
     """
     instants = np.asarray(line.get_xdata() if t is None else t)
     if len(instants) and run.marker:

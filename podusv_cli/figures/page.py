@@ -199,10 +199,11 @@ def _spread(
     before: Sequence[float],
     after: Sequence[float],
 ) -> tuple[Vector, Vector]:
-    """Where rows or columns begin and end [inches].
+    """Where each row (or column) of panels begins and ends [inches], two arrays (rows,).
 
-    `size` is that of the page, `ratios` are of their own sizes, `edges` are kept at both ends of
-    the page, `before` and `after` at each row.
+    `size` [inches] is that of the page; `ratios` (rows,) say how the panels share what is free.
+    Also in [inches], `edges` are free at both ends of the page, and `before` and `after` at each
+    row, for its labels.
     """
     # Labels that need more than the page would leave nothing of the panels.
     free = max(size - sum(edges) - sum(before) - sum(after), 0.2 * size)

@@ -158,7 +158,10 @@ class _Decades(Locator):
         return self.tick_values(*self.axis.get_view_interval())  # type: ignore[union-attr]
 
     def tick_values(self, vmin: float, vmax: float) -> list[float]:
-        """Ticks between two values."""
+        """Ticks between two values, the ends of the axis: 0 and decades of both signs.
+
+        At most SIDE_TICKS decades of a sign are taken, at equal distances.
+        """
         largest = max(abs(vmin), abs(vmax), 10.0**self.first)
         count = math.floor(math.log10(largest)) - self.first + 1
         steps = range(self.first, self.first + count, -(-count // SIDE_TICKS))
@@ -174,7 +177,10 @@ def _settled_size(run: Shown, name: str) -> float:
 
 
 def _shares(axes: Axes, run: Shown) -> list[PolyCollection]:
-    """Draw V's terms, stacked, each as its part of V (0 to 1); the layers, for a legend."""
+    """Draw V's terms, stacked, each as its part of V (0 to 1), and return the layers for a legend.
+
+    Where V is 0, all parts are 0.
+    """
     time = run.recording["time"]
     terms = np.stack([_means(run.signal(term.name)) for term in TERMS])
     total = terms.sum(axis=0)

@@ -117,9 +117,9 @@ def thin_trace(numbers: Vector) -> tuple[Vector, Vector]:
 
 
 def encode_trace(numbers: Vector, places: Vector) -> dict[str, str]:
-    """The arrays in base 64: four bytes a number, the least significant first, and a byte a place.
+    """The arrays (n,) in base 64: four bytes a number, the least significant first, a byte a place.
 
-    What exceeds the range of four bytes is NaN.
+    A number beyond the range of four bytes is NaN. A page decodes both.
     """
     with np.errstate(over="ignore"):
         small = np.asarray(numbers, dtype="<f4")

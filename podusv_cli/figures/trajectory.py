@@ -329,7 +329,10 @@ def _farthest_apart(runs: Sequence[Shown], target: Target, last: float) -> list[
 
 
 def close_up(axes: Axes, view: View, among: Sequence[Shown]) -> None:
-    """Tracks around the time of the view, hulls to scale."""
+    """Draw tracks around the time of the view, with hulls to scale.
+
+    `among` are all runs of the figure: their order gives the widths of tracks.
+    """
     _draw_tracks(axes, [view.target], view.tracks, view.span, among)
     for run in view.hulls:
         _draw_hull(axes, run, view.t, 1.0)

@@ -220,9 +220,10 @@ def _arrives(errors: Vector, fraction: float, radius: float) -> bool:
 
 
 def _reversals(part: dict[str, Vector], turned: float) -> str | None:
-    """What a zig-zag has not come to, or None; `turned` is its change of heading so far [rad].
+    """What a zig-zag lacks of its REVERSALS, in words, or None.
 
-    `part` has its signals since it began, by name.
+    `part` has its signals (n,) since it began, by name; `turned` is the change of heading so far
+    [rad].
     """
     count = int((np.diff(np.sign(part["delta_s"])) != 0.0).sum())
     if count >= REVERSALS:
@@ -240,7 +241,11 @@ def _turn(part: dict[str, Vector], turned: float) -> str | None:
 
 
 def _way(part: dict[str, Vector], turned: float) -> str | None:
-    """What a stopping trial has not come to, or None; `part` has its signals since it began."""
+    """What a stopping trial has not come to, in words, or None.
+
+    `part` has its signals (n,) since it began, by name. `turned` is not used: the three such
+    functions are called alike.
+    """
     if part["u"][0] <= 0.0:
         return "the hull does not go ahead when it is to stop; give it more speed"
     slowest = float(part["u"].min())

@@ -17,7 +17,8 @@ BURST = 2.0  # growth of the error that counts
 def rk4_growth(loop: Loop, step: float) -> float:
     """Spectral radius of one RK4 step [s] of the loop; 1 where the loop itself is unstable.
 
-    Above 1 the integrator is unstable although the loop is stable.
+    Above 1 the integrator is unstable although the loop is stable. An unstable loop is the business
+    of other findings.
     """
     if not np.isfinite(loop.matrix).all() or np.linalg.eigvals(loop.matrix).real.max() > 0.0:
         return 1.0
@@ -50,7 +51,8 @@ def sampled_growth(loop: Loop, step: float, count: int, *, update_first: bool = 
 def _updated_first(loop: Loop, step: float, count: int) -> float:
     """`sampled_growth` where the law's memory is updated before the error is held.
 
-    m' = F (e_held, m) comes first, then e' = -d e + g . (e_held, m).
+    m' = F (e_held, m) comes first, then e' = -d e + g . (e_held, m). `step` [s] is that of RK4,
+    `count` the number of steps between two samples.
     """
     rates = np.vstack([np.zeros(1 + len(loop.memory)), loop.memory])
     updated = np.linalg.matrix_power(_rk4(rates, step), count)
@@ -172,7 +174,7 @@ def bursts(loop: Loop, bound: AdaptedBound, error: float, step: float) -> bool:
     matrix, count = loop.matrix, len(loop.memory) + 1
 
     def rates(s: Vector) -> Vector:
-        """The rates of `s`: velocity error [m/s], the loop's memory, estimated load b_hat [N]."""
+        """Rates of `s` (2 + memory,): velocity error [m/s], loop's memory, estimated load [N]."""
         phi = s[0] / (4.0 * bound.partial)
         linear = matrix @ s[:count]
         linear[0] -= (s[-1] - bound.initial) * phi / bound.inertia

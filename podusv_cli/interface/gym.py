@@ -224,7 +224,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
     def step(self, actions: Vector) -> tuple[Vector, Vector, Flags, Flags, Info]:
         """As `Env.step`, for all environments: arrays with a row, or an entry, for each of them.
 
-        Raises UsageError for demands that are not so many finite numbers each; no run goes on then.
+        `actions` have the shape (environments, demands). Raises UsageError for demands that are not
+        so many finite numbers each; no run goes on then.
         """
         given, ended = (
             self._check_actions(actions).T,

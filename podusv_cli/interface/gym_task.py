@@ -252,10 +252,10 @@ class EpisodeTask:
 def _finite(
     given: Any, shape: tuple[int, ...], whose: str, time: Any, idle: Flags | bool = False
 ) -> Vector:
-    """Numbers of a user's function in this shape, also where they are the same for all runs.
+    """Numbers `given` by a user's function in this shape, also where all runs share them.
 
-    `whose` names the function in the message; numbers of `idle` runs may be none, and are 0 then.
-    Raises UsageError.
+    `whose` names the function in the message, and `time` [s] is when it was called. Numbers of
+    `idle` runs may be NaN or infinite, and are 0 then. Raises UsageError.
     """
     try:
         array = np.broadcast_to(numbers(given), shape)

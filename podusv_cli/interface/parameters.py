@@ -34,7 +34,8 @@ Columns = dict[str, list[Any]]  # by key, with one value a run
 def columns(parameters: Mapping[str, Any]) -> Columns:
     """The values as Python's own, by key, each list with one value a run.
 
-    Raises ParameterError (a ValueError) unless every key has as many values.
+    `parameters` are lists or arrays by key. Raises ParameterError (a ValueError) unless every key
+    has as many values.
     """
     by_key = {key: _column(key, given) for key, given in parameters.items()}
     lengths = {key: len(column) for key, column in by_key.items()}
@@ -48,7 +49,10 @@ def columns(parameters: Mapping[str, Any]) -> Columns:
 
 
 def _column(key: str, given: Any) -> list[Any]:
-    """The values of one key as Python's own, one a run. Raises ParameterError."""
+    """The values of one key as Python's own, one a run, from a list or array (runs,).
+
+    Raises ParameterError for anything else.
+    """
     array = np.asarray(given, object)
     if array.ndim != 1:
         what = f"an array of shape {array.shape}" if array.ndim else f"{given!r:.60}"

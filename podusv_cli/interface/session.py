@@ -182,7 +182,7 @@ class Session:
     def _check_demand(self, demand: Sequence[float] | Vector) -> tuple[float, ...]:
         """The demand as numbers: surge force [N], yaw moment [N m] and, if taken, sway force [N].
 
-        Raises UsageError, also after the end of the run.
+        Raises UsageError unless it is so many finite numbers, and after the end of the run.
         """
         if self._status != "running":
             raise UsageError(

@@ -51,7 +51,10 @@ def _fields(kind: type[Component]) -> frozenset[str]:
 
 
 def _inside(whole: Any, step: str | int) -> Any:
-    """One step down: a field by name, an item of a list by index; else LookupError."""
+    """What is one step down in `whole`: a field by name, an item of a list by index.
+
+    Raises LookupError where there is nothing.
+    """
     if isinstance(whole, Component) and step in _fields(type(whole)):
         return getattr(whole, str(step))
     if isinstance(whole, tuple) and isinstance(step, int):
@@ -153,7 +156,10 @@ def _part(scenario: Scenario, at: Route, old: Component, new: Mapping[Route, Any
 
 
 def _with(whole: Any, steps: Route, new: Any) -> Any:
-    """Plain data (dicts and tuples) with `new` at the place that `steps` lead to; a copy."""
+    """A copy of plain data (dicts and tuples) with `new` at the place that `steps` lead to.
+
+    `whole` is the data; only what lies on the way to the place is copied.
+    """
     if not steps:
         return new
     step = steps[0]

@@ -292,7 +292,7 @@ class Key:
 
 
 def _scalars(annotation: Any) -> Iterator[Any]:
-    """The types of single values in an annotation; those within tuples one by one."""
+    """The types of single values in a type `annotation`; those within tuples one by one."""
     for member in members(annotation):
         if get_origin(member) is tuple:
             yield from (scalar for part in get_args(member) for scalar in _scalars(part))

@@ -35,7 +35,7 @@ def check(root: Node, top: Key, faults: list[Fault]) -> Scenario | None:
 
 
 def with_defaults(key: Key | None, data: Any) -> Any:
-    """The data over the default of its section, which `key` describes.
+    """The `data` of a section over its default, which `key` describes; likewise in parts of it.
 
     Otherwise one key given under `disturbance.b_u` would silently set the others to zero.
     """
@@ -146,7 +146,10 @@ def _home(name: str, kinds: dict[str, Key]) -> str:
 
 
 def _missing(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
-    """A fault for a required key that is not there; for a missing item, of its list."""
+    """A fault for a required key that is not there; for a missing item, of its list.
+
+    `complaint` is the error of pydantic. No fault where an earlier one explains it.
+    """
     if isinstance(key.path[-1], int):
         yield from _wrong(root, _key(key.top, complaint["loc"][:-1]), complaint)
     elif not _is_explained(root, key.path):
@@ -155,7 +158,10 @@ def _missing(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
 
 
 def _no_kind(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
-    """A fault for a section without `kind`; its keys may show which kind was meant."""
+    """A fault for a section without `kind`; its keys may show which kind was meant.
+
+    No fault where an earlier one explains it.
+    """
     route = (*section.path, "kind")
     if not _is_explained(root, route):
         node = follow(root, section.path)[-1]

@@ -136,7 +136,10 @@ def _under(
 
 
 def _as_node(content: Any, mark: Mark) -> Node:
-    """A value of a file as a node, with the values in it."""
+    """A value of a file (dict, tuple or single value) as a node, with the values in it.
+
+    All values get the same `mark`, that of the file.
+    """
     if isinstance(content, dict):
         return Node({name: _as_node(part, mark) for name, part in content.items()}, mark)
     if isinstance(content, tuple):

@@ -136,7 +136,7 @@ def _plan(text: str) -> RouteFile:
 def _simple_items(items: Any) -> Iterator[Mapping[str, Any]]:
     """The items of a mission; a survey or a corridor is replaced by the items that it consists of.
 
-    Raises RouteFault for an item that is none.
+    `items` is a list as the file has it, unchecked. Raises RouteFault for an item that is none.
     """
     for item in _list(items):
         if not isinstance(item, Mapping):
@@ -175,7 +175,10 @@ def _counts(others: Mapping[str, int]) -> tuple[str, ...]:
 
 
 def _geojson(data: Mapping[str, Any]) -> RouteFile:
-    """The first line of GeoJSON, or its points in their order."""
+    """The first line of GeoJSON, or its points in their order.
+
+    `data` is the file's content. What else it has is counted in `left_out`.
+    """
     lines, points, others = [], [], Counter[str]()
     for geometry in _geometries(data):
         kind, where = str(geometry.get("type")), geometry.get("coordinates")
@@ -208,7 +211,10 @@ def _geometries(data: Any) -> Iterator[Mapping[str, Any]]:
 def _line_or_points(
     lines: Sequence[Any], points: Sequence[Any]
 ) -> tuple[Sequence[Any], tuple[str, ...]]:
-    """The first line where there is one, else all points; and what is left out, in words."""
+    """The first line where there is one, else all points; and what is left out, in words.
+
+    `lines` and `points` hold coordinates as the file has them.
+    """
     if not lines:
         return points, ()
     others = {"lines after the first": len(lines) - 1, "single points": len(points)}

@@ -72,7 +72,10 @@ def schema_text(codes: tuple[str, ...], plugins: Plugins = ()) -> str:
 
 
 def _whole(items: dict[str, Any], definitions: Mapping[str, Any]) -> dict[str, Any]:
-    """Items of a list with the keys that they need, which no other file can give."""
+    """Items of a list with all keys that they need, as no other file can complete an item.
+
+    `items` is their schema (`anyOf` with references), `definitions` are the schemas referred to.
+    """
     choices = []
     for choice in items["anyOf"]:
         needed = definitions[choice["$ref"].rpartition("/")[2]].get("required", [])
@@ -128,7 +131,10 @@ def _number_in(unit: str) -> dict[str, Any]:
 
 
 def _or_with_unit(schema: dict[str, Any], unit: str) -> dict[str, Any]:
-    """The schema whose numbers may also be written with a unit of the quantity `unit`."""
+    """The schema whose numbers may also be written with a unit of the quantity `unit`.
+
+    Items, entries and alternatives are rewritten, too; `schema` itself stays as it is.
+    """
     made = dict(schema)
     if made.get("type") == "number":
         # An editor looks for these beside `anyOf`, not within it.
@@ -150,12 +156,13 @@ def _choices(part: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _inside(word: str, part: Any) -> Any:
-    """The content of one keyword `word` of a JSON schema, rewritten from pydantic's dialect."""
+    """The content `part` of a schema's keyword `word`, rewritten from pydantic's dialect."""
     if word in ("properties", "patternProperties"):
         return {name: _convert_schema(schema) for name, schema in part.items()}
     if word == "$ref":
         return part.replace("#/$defs/", "#/definitions/")
     if isinstance(part, list) and word != "enum":
         return [_convert_schema(schema) if isinstance(schema, dict) else schema for schema in part]
+    # Defaults and enums are data, which may look like schemas.
     is_schema = isinstance(part, dict) and word != "default"
     return _convert_schema(part) if is_schema else part

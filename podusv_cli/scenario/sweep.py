@@ -81,9 +81,10 @@ class Quantity(Distribution):
         return bool(self.times or self.plus)
 
     def value(self, own: Any, drawn: Any, place: int = 0) -> Any:
-        """The value of a key, from the scenario's own value and the draw.
+        """The value of a key, from the scenario's `own` value and what was `drawn`.
 
-        `place` is the key's position in `targets`; for rows, `drawn` is the number of the row.
+        A factor or a summand applies to the own value; other draws replace it. `place` is the key's
+        position in `targets`; for rows, `drawn` is the number of the row.
         """
         if self.rows:
             numbers = self.lines.rows[drawn]

@@ -168,7 +168,7 @@ def plain_node(text: str, mark: Mark, key: str, faults: list[Fault]) -> Node:
 def text_node(content: Any, mark: Mark, key: str, faults: list[Fault], *, text: str = "") -> Node:
     """The node of a scalar; control characters are a fault, as a terminal may obey them.
 
-    `text` is the scalar as written.
+    `content` is the value, `text` the scalar as written, and `key` where it stands.
     """
     unfit = [c for c in str(content) if unicodedata.category(c) in ("Cc", "Cs") and c not in "\t\n"]
     if unfit:
@@ -332,7 +332,10 @@ class _Reader:
         return replace(node, faulty=node.faulty or bool(event.tag))
 
     def _list(self, event: Any, route: Route) -> Node:
-        """A list; without items where one of them is faulty, so that its length is not judged."""
+        """The node of a list that begins with `event`, at `route`.
+
+        It has no items where one of them is faulty, so that its length is not judged.
+        """
         items: list[Node] = []
         while not isinstance(item := self._next(), yaml.SequenceEndEvent):
             items.append(self._node(item, (*route, len(items))))
@@ -340,7 +343,10 @@ class _Reader:
         return Node(() if faulty else tuple(items), self._start(event), faulty=faulty)
 
     def _mapping(self, event: Any, route: Route) -> Node:
-        """A mapping; a key that is given twice is a fault, with the line of the first."""
+        """The node of a mapping that begins with `event`, at `route`.
+
+        A key that is given twice is a fault, with the line of the first.
+        """
         entries: dict[str, Node] = {}
         while not isinstance(head := self._next(), yaml.MappingEndEvent):
             key = self._key(head, route, _decimal_comma(head, entries))
@@ -354,7 +360,7 @@ class _Reader:
         return Node(entries, self._start(event))
 
     def _key(self, event: Any, route: Route, advice: str) -> str | None:
-        """The key of a mapping, or None after a fault.
+        """The key that begins with `event`, in the mapping at `route`, or None after a fault.
 
         `advice` is the end of a message where the key shows what was meant, else "".
         """

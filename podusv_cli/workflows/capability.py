@@ -114,7 +114,7 @@ def _check_formats(formats: Any) -> None:
 
 
 def _write(writer: RunWriter, done: CapabilityOfScenario, formats: Any) -> None:
-    """JSON, CSV, and the figure in each format."""
+    """Write the result as JSON and CSV, and its figure in each of `formats` (png, ...)."""
     from podusv_cli.figures.capability import polar  # matplotlib is slow to import
     from podusv_cli.figures.style import house_style, image
 

@@ -132,6 +132,7 @@ def _about_unit(times: Vector, duration: float) -> str:
     """What to write where the numbers of a clock, `times` (n,), are not in seconds; else "".
 
     Signs are dates, a span that would fit the run in another unit, and the distance of rows.
+    `duration` [s] is that of the run.
     """
     from podusv_cli.identify.logs.checks import FINER, SLOWEST  # h5py is slow to import
 

@@ -171,8 +171,8 @@ class Live:
     def check_offered(self, moved: Mapping[str, Any]) -> Moved:
         """The values moved, if they are among those that the page was offered. Raises UsageError.
 
-        So no page can name a plug-in or a file. In a shared address kinds come before their keys:
-        these are loaded first, and then offer theirs.
+        So no page can name a plug-in or a file. An empty offer stands for a number. In a shared
+        address kinds come before their keys: these are loaded first, and then offer theirs.
         """
         if not moved.keys() <= self.offered.keys():
             kinds = {key: kind for key, kind in moved.items() if key.endswith(".kind")}

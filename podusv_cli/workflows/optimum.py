@@ -104,7 +104,10 @@ def optimum_of(
     step: float,
     progress: Progress | None = None,
 ) -> Optimum:
-    """As `optimum`, for a scenario that is loaded already."""
+    """Find and write the optimum as `optimum` does, for a scenario that is loaded already.
+
+    `step` [s] is that of the finest grid.
+    """
     collocation.casadi()
     scenario = single(loaded, request.controller) if request.controller else loaded.scenario
     wanted = problem(scenario, minimised)

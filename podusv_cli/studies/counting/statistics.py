@@ -125,8 +125,8 @@ def quantile(values: Vector, q: float, level: float) -> Interval:
 def quantiles(values: Vector, shares: Sequence[float], level: float) -> list[Interval]:
     """Quantiles of `values` (n,) at each of `shares` (0 to 1), with intervals of this level.
 
-    `values` is sorted once for all of them. NaN counts as +inf for the estimate and the high end,
-    and as -inf for the low end.
+    `values` is sorted once for all of them, and `level` is the confidence. NaN counts as +inf for
+    the estimate and the high end, and as -inf for the low end: an unknown value could be either.
     """
     n = values.shape[-1]
     unknown = np.isnan(values).any()
@@ -155,7 +155,7 @@ def _rank(n: int, q: float, level: float) -> int:
     """The rank (from 1) of the lower end of the q-quantile's interval; 0 where n is too small.
 
     It is the largest r for which r - 1 or fewer of `n` draws lie below the quantile with a
-    probability of at most (1 - level) / 2.
+    probability of at most (1 - level) / 2. `q` is from 0 to 1, `level` the confidence.
     """
     from scipy.special import bdtr  # slow to import
 

@@ -34,7 +34,10 @@ class Statistic:
 
     @classmethod
     def of(cls, statistic: str, sample: Sample, level: float) -> Self:
-        """The statistic of a sample, with its interval at this level; `statistic` is its text."""
+        """The statistic of a sample, with its interval at the confidence `level`.
+
+        `statistic` is its text in the claim.
+        """
         estimate, low, high = map(float, sample.interval(level))
         return cls(
             statistic,

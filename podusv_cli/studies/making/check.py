@@ -302,7 +302,10 @@ def _wrong_values(
 def _scenario_or_refusal(
     name: str, quantity: Quantity, scenario: Scenario, value: Any
 ) -> Scenario | str:
-    """The scenario with this draw, or the sentence that says why it cannot be."""
+    """The scenario with this draw, or the sentence that says why it cannot be.
+
+    `value` is the draw of the quantity called `name`.
+    """
     try:
         return draw_scenario(scenario, {name: quantity}, {name: value})
     except ValueRefused as error:

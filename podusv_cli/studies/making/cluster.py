@@ -258,7 +258,7 @@ class Cluster:
     def _reply(self, future: Any) -> Reply:
         """What a worker answered; an error becomes an outcome with a failure.
 
-        Raises StorageError where the scheduler is lost.
+        `future` is that of Dask, and is over. Raises StorageError where the scheduler is lost.
         """
         if future.status == "error":
             error = future.exception()

@@ -122,9 +122,9 @@ def mixture(folder: Path) -> str:
 
 
 def _machines(folder: Path) -> list[str]:
-    # A session that was killed has no end, and does not know how many runs it made.
     """The machines that made a study's runs, each once, in the order of sessions."""
     # A session without runs, such as one that only wrote a report, says nothing of the numbers.
+    # A session that was killed has no end, and does not know how many runs it made.
     made = (
         session for session in sessions(folder) if session["runs"] or session["finished"] is None
     )
@@ -138,7 +138,10 @@ def machines(folder: Path) -> str:
 
 
 def _machine(session: Mapping[str, Any]) -> str:
-    """Processor and versions of a session, which decide the bits of its runs."""
+    """Processor and versions that decide the bits of a session's runs, in words.
+
+    `session` is one of `sessions`.
+    """
     platform, packages = session["platform"], session["packages"]
     return (
         f"{platform['processor']} ({platform['libc']}, podusv {session['podusv']}, "

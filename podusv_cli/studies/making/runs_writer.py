@@ -126,12 +126,13 @@ def bytes_of(shape: tuple[int, int, int], metrics: int, drawn: int) -> int:
 def _extent(
     file: h5py.File, name: str, kind: Any, shape: tuple[int, ...], scales: Sequence[h5py.Dataset]
 ) -> Extent:
-    """Describe an array in `file` whose bytes podusv writes; where they lie.
+    """Describe an array in `file` whose bytes podusv writes itself; returns where they lie.
 
-    `scales` are the labels of its axes. Space is allotted at once (EARLY) and not filled (NEVER),
-    so that its place in the file is known now.
+    `kind` is the type of its numbers, `scales` are the labels of its axes. Space is allotted at
+    once (EARLY) and not filled (NEVER), so that its place in the file is known now.
     """
     made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    # The same results make the same bytes, whenever they are written.
     made.set_obj_track_times(False)
     made.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     made.set_fill_time(h5py.h5d.FILL_TIME_NEVER)

@@ -252,10 +252,10 @@ def distributions(values: Mapping[str, Vector], label: str, level: float) -> Fig
 def failure_rates(
     values: Mapping[str, Vector], label: str, threshold: float, level: float
 ) -> Figure:
-    """The share of draws that fail, were the metric's threshold another one.
+    """The share of draws that fail as a function of the metric's threshold, a curve a law.
 
     `values` are (draws,) by law, +inf for runs that fail whatever the threshold; `label` names the
-    metric; `level` is the confidence of the bands.
+    metric; a line marks the study's own `threshold`; `level` is the confidence of the bands.
     """
     figure = new_figure(COLUMNS, 2.6)
     axes = figure.add_subplot()
@@ -395,7 +395,8 @@ def funnel(curves: Mapping[str, Sequence[Track]]) -> Figure:
 def _span_of(distances: Sequence[Vector]) -> tuple[float, float]:
     """The ends of a logarithmic axis [m] that shows most runs.
 
-    Runs that peak beyond WIDE times the median peak, as a lost vessel does, may leave it.
+    `distances` are (n,) [m], one array a run. Runs that peak beyond WIDE times the median peak, as
+    a lost vessel does, may leave it.
     """
     peaks = np.array([float(np.max(distance)) for distance in distances])
     lows = [float(np.min(distance)) for distance in distances]

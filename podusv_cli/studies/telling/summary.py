@@ -46,9 +46,10 @@ def pairs(
 ) -> Rows:
     """For every metric, cell and two laws a and b: who wins how often, and the median of a / b.
 
-    Of the draws that both laws met. A win is a smaller metric by more than the margin, which is
-    relative; a larger one where more is better. `names` are those of the runs' laws that are
-    compared, by their names in the table; by default all.
+    Of the draws that both laws met. A win is a smaller metric by more than the `margin`, which is
+    relative (0.01 is 1 %); a larger one where more is better. `level` is the confidence of
+    intervals. `names` are those of the runs' laws that are compared, by their names in the table;
+    by default all.
     """
     laws = names or {law: law for law in runs.laws}
     return [
@@ -136,7 +137,10 @@ def _columns(runs: StudyRuns, law: str, cell: int, metrics: Known) -> Iterator[t
 
 
 def _failures(runs: StudyRuns, law: str, cell: int, level: float) -> dict[str, Any]:
-    """Failed draws of a law in a cell: counts, and their share with its interval."""
+    """Failed draws of a law in a cell: counts, and their share with its interval.
+
+    `level` is the confidence of the interval. Broken runs, which crashed or hung, count as failed.
+    """
     done: Mask = runs.done(law)[cell]
     failed, n = int(np.sum(done & ~runs.success(law)[cell])), int(np.sum(done))
     return {

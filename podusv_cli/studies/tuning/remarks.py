@@ -93,7 +93,10 @@ def _once(results: SearchResults) -> Iterator[str]:
 
 
 def _verdict(row: dict[str, Any]) -> str:
-    """Which law of a pair is better, by the interval of their ratio."""
+    """Which law of a pair is better, by the interval of the ratio a / b of their objectives.
+
+    Less is better. `row` is one of the table of `ratios`.
+    """
     if row["ratio_high"] < 1.0:
         return f"{row['a']} is better"
     if row["ratio_low"] > 1.0:

@@ -104,7 +104,7 @@ def ratio(row: Any) -> str:
 def spread(row: Any) -> str:
     """The objective of the searches' winners: median (least to largest).
 
-    It is a dash for a single search.
+    `row` is one of the answer's table. A dash for a single search.
     """
     middle, low, high = (row[f"repeats_{end}"] for end in ("median", "low", "high"))
     if math.isnan(low) or low == high:

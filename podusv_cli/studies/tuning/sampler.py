@@ -63,7 +63,8 @@ class Sampler:
     def tell(self, values: Values, excesses: Sequence[Values]) -> None:
         """Take in the objective of each trial asked last, and its excess of every inequality.
 
-        `excesses` has a row a trial; above 0, an inequality does not hold.
+        `values` are (trials,), `excesses` (trials, inequalities); above 0, an inequality does not
+        hold.
         """
         with _quiet():
             for trial, number, over in zip(self._asked, values, excesses, strict=True):

@@ -107,9 +107,9 @@ class GainSearch:
         return units
 
     def _ask(self, left: int) -> None:
-        """Ask for as many trials as the budget has whole ones for.
+        """Ask for the trials of a batch, as many as there is budget for (`left`, in runs).
 
-        The last one is cut to what is left. `left` is the budget that is left, in runs.
+        If it does not suffice for a whole trial, a single one is cut to what is left.
         """
         tune = self.plan.tune
         count, draws = min(tune.batch, left // tune.train), tune.train
@@ -205,7 +205,10 @@ class GainSearch:
         return any(_far(trial.first, value) for trial in sound)
 
     def _make_trials(self) -> Iterator[GainTrial]:
-        """The trials of the batch that is over: finished, pruned, or cut short by the budget."""
+        """The trials of the batch that is over: finished, pruned, or cut short by the budget.
+
+        A trial that was cut was to meet fewer draws than `train` from the start.
+        """
         tune = self.plan.tune
         for place, attempt in enumerate(self._attempts):
             runs, met = self._runs(attempt), attempt.draws_met
@@ -235,11 +238,12 @@ class GainSearch:
         return self.plan.runs(attempt.results)
 
     def _first(self, attempt: Attempt) -> Outcomes:
-        """The runs of the first draws."""
+        """The runs of a trial's first draws, by which trials are compared for pruning."""
         metrics, failed = self._runs(attempt)
         return Outcomes({n: v[: self.first] for n, v in metrics.items()}, failed[: self.first])
 
     def _value(self, runs: Outcomes) -> float:
+        """The objective of some runs; less is better."""
         return evaluate(self.plan.objective, runs, self.plan.metrics)
 
 

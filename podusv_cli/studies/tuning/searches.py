@@ -135,7 +135,7 @@ def compare_laws(
 
 
 def ratios(runs: Mapping[str, Vector], level: float, seed: int, *, sets: int = 1) -> pd.DataFrame:
-    """The table of `compare_laws`.
+    """The table of `compare_laws`: a row for each pair, with ratio and interval.
 
     A pair of which a sample is not finite has no interval, unless all samples are infinite on one
     side.
@@ -168,10 +168,10 @@ def _one_sided(ratio: float) -> float:
 
 
 def _ends(ratio: float, spread: Vector, width: float) -> tuple[float, float]:
-    """The interval of a ratio from its logarithm and the logarithms in all samples, `spread` (n,).
+    """The interval of a ratio, from its logarithm and those of all samples, `spread` (n,).
 
-    `width` is in standard deviations. Samples that are all infinite to one side leave no doubt;
-    otherwise, infinite samples leave everything open.
+    `width` is half of the interval in standard deviations. Samples that are all infinite to one
+    side leave no doubt; otherwise, infinite samples leave everything open.
     """
     if np.isfinite(spread).all():
         half = width * spread.std()

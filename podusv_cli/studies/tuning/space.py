@@ -149,7 +149,10 @@ def _of(wanted: float | Range, key: str, own: Any, field: Any) -> list[Gain]:
 
 
 def _around(factor: float, key: str, own: Any, field: Any) -> Gain:
-    """The range from own / factor to own * factor, cut to the limits of the law's `field`."""
+    """The range from own / factor to own * factor, cut to the limits of the law's `field`.
+
+    `own` is the scenario's value of the gain `key`, which is positive.
+    """
     low, high = float(own) / factor, float(own) * factor
     ends = limits(field)
     low = max(low, ends.get("ge", low), ends.get("gt", low))
