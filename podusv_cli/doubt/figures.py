@@ -70,6 +70,7 @@ def specification(
     turned, known = count_turns(name, tried.worlds, tried.base)
     order = [i for i in np.argsort(numbers) if np.isfinite(numbers[i])]
     lanes = _lanes(report, answer, {a.choice.name for a in acting}, numbers[order], order)
+    # The upper panel is 2.2 inches high.
     figure = new_figure(COLUMNS, 2.2 + LANE * len(lanes))
     top, below = figure.subplots(
         2, 1, sharex=True, gridspec_kw={"height_ratios": [2.2, LANE * len(lanes)]}
@@ -82,6 +83,7 @@ def specification(
             continue
         top.plot(at, numbers[[order[x] for x in at]], mark, color=colour, ms=3.0, label=label)
         for lane, column in enumerate(lanes):
+            # A lane is 1 high: shares 0 to 1 of its range fill 0.8 of it, so that lanes stay apart.
             heights = lane + 0.1 + 0.8 * tried.draws.shares[[order[x] for x in at], column]
             below.plot(at, heights, mark, color=colour, ms=1.6)
     own = number.of(answer.numbers)

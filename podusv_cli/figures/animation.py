@@ -133,6 +133,7 @@ def stage(axes: Axes, runs: Sequence[Shown], *, near: bool = False) -> Callable[
     followed = chased[0][0] if chased else runs[0].recording
     place = ("y_d", "x_d") if chased else ("y", "x")
     tracks = [axes.plot([], [], **run.line_style)[0] for run in runs]
+    # A hull has five corners; they are moved in each frame.
     hulls = [Polygon(np.zeros((5, 2)), color=run.color) for run in runs]
     for outline in hulls:
         axes.add_patch(outline)

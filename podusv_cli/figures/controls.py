@@ -45,6 +45,7 @@ def controls(runs: Sequence[Shown], columns: int) -> Figure:
     loads = (*LOADS, SWAY) if any(run.has(SWAY[1]) for run in runs) else LOADS
     kinds = 2 if any(differ(run, *names) for run in runs for names in loads) else 1
     rows = kinds * (len(loads) if columns == 2 else len(spans))
+    # 0.7 inches are for the legend and the labels of the time axis.
     figure = new_figure(columns, 0.7 + HEIGHTS[columns] * rows)
     cells = _cells(figure, (len(loads), kinds), list(spans), columns)
     for (load, kind, part), axes in np.ndenumerate(cells):

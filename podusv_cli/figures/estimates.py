@@ -67,6 +67,7 @@ def _small_multiples(runs: Sequence[Shown], columns: int) -> Figure:
     """
     blocks = -(-len(runs) // ABREAST[columns])
     abreast = -(-len(runs) // blocks)
+    # Each block has 0.4 inches for the names of its runs; 0.7 are for legend and time axis.
     figure = new_figure(columns, 0.7 + 0.4 * blocks + SMALL_HEIGHT * blocks * len(STATE))
     cells = figure.add_gridspec(blocks * len(STATE), abreast)
     # Letters of a name that fit above a column, less the panel's own letter.

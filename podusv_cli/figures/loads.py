@@ -47,6 +47,7 @@ def _limits(axes: Axes, runs: Sequence[Shown]) -> None:
         axes.broken_barh(spells, (place - 0.3, 0.6), color=run.color, linewidth=0.6)
         axes.plot([run.start, run.end], [place, place], color=run.color, linewidth=0.4)
     axes.set_yticks(range(len(runs)), [run.name for run in runs])
+    # The first run stands on top.
     axes.set_ylim(len(runs) - 0.4, -0.6)
     axes.set_title("limited by the actuator")
     axes.grid(visible=False, axis="y")

@@ -68,6 +68,7 @@ def grid(count: int, columns: int) -> tuple[Page, list[Axes]]:
     A panel that is alone in the last row fills it.
     """
     rows = math.ceil(count / columns)
+    # 0.7 inches are for the legend and the labels of the time axis.
     figure = new_figure(columns, 0.7 + PANEL_HEIGHT * rows)
     cells = figure.add_gridspec(rows, columns)
     alone = count % columns == 1 < columns

@@ -73,5 +73,6 @@ def _scales(axes: Axes) -> None:
     if np.isfinite(top) and top > 0.0:
         floor = top * 10.0**-DECADES
         last = max(float(np.max(rates[rms > floor], initial=0.0)) for rates, rms in curves)
+        # Some room is left above the highest and beyond the last harmonic that is shown.
         axes.set(xscale="log", yscale="log", ylim=(floor, 3.0 * top))
         axes.set_xlim(right=1.1 * last)

@@ -84,6 +84,7 @@ def bounds(runs: Sequence[Shown], room: float = 0.0) -> tuple[Span, Span]:
     pairs += [(run.recording["y"][:1], run.recording["x"][:1]) for run in runs]
     corners = ([(part.min(), part.max()) for part in parts] for parts in zip(*pairs, strict=True))
     east, north = (np.ravel(extremes) for extremes in corners)
+    # 6 % of the larger extent; targets at one place still get a map of some size.
     margin = max(0.06 * max(float(np.ptp(east)), float(np.ptp(north)), 1.0), room)
     return (
         (float(east.min()) - margin, float(east.max()) + margin),

@@ -120,6 +120,7 @@ def _sheet(
     high = columns == 2 and shape < WIDE_MAP
     if high:
         width = float(np.clip(HIGH_MAP * shape, *MAP_WIDTHS))
+        # Inches are left for titles, labels of axes and the legend: 0.9 in height, 0.6 in width.
         figure = new_figure(columns, HIGH_MAP + 0.9)
         rest = (WIDTHS[columns] - width - 0.6) / asides
         cells = figure.add_gridspec(
@@ -133,6 +134,8 @@ def _sheet(
     else:
         height = float(np.clip((WIDTHS[columns] - 0.6) / shape, 1.2, WIDTHS[columns]))
         beside = distances and columns == 2
+        # Close-ups get 1.6 inches in height, distances 1.1; each row has 0.6 for its title and
+        # labels.
         rows = [height, 1.6, 1.1] if distances and not beside else [height, 1.6]
         figure = new_figure(columns, sum(rows) + 0.6 * len(rows))
         cells = figure.add_gridspec(
@@ -289,6 +292,7 @@ def _deviation(runs: Sequence[Shown], target: Target, last: float) -> View:
     worst, error = runs[largest], errors[largest]
     instant = float(worst.recording["time"][np.argmax(error)])
     middle = np.array([worst.at(instant, name) for name in ("y", "x")])
+    # The largest deviation fills two thirds of the view's half width, unless hulls set the size.
     reach = min(max(NEAREST * worst.length, 1.5 * float(error.max())), FARTHEST * worst.length)
     name = "farthest from the path"
     return View(name, instant, runs, (0.0, np.inf), [worst], target, middle, reach)

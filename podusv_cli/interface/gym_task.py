@@ -234,6 +234,7 @@ class EpisodeTask:
                 self.scenario, self.sweep.vary, next(draws(self.sweep, seed, 1, SWEEP))
             )
         sweep = self.sweep.model_copy(update={"design": "random"})
+        # The number of the draw is itself random, in a stream (LEARNING) that no study has.
         draw = next(draws(sweep, int(random.integers(2**53)), 1, LEARNING))
         return draw_scenario(self.scenario, sweep.vary, draw)
 

@@ -37,10 +37,10 @@ class Bounded(Component):
 
     @abstractmethod
     def whole(self, u: Vector) -> Vector:
-        """The values (n,) for shares u (n,) in [0, 1), without `within`."""
+        """The values (n,) for shares u (n,) in (0, 1), without `within`."""
 
     def at(self, u: Vector) -> Vector:
-        """The values (n,) for shares u (n,) in [0, 1), within the bounds."""
+        """The values (n,) for shares u (n,) in (0, 1), within the bounds."""
         if self.within is None:
             return self.whole(u)
         low, high = self.shares
@@ -94,7 +94,7 @@ class Normal(Bounded):
     sigma: float = value(..., OF_SECTION, "its standard deviation", gt=0)
 
     def whole(self, u: Vector) -> Vector:
-        """The values (n,) for shares u (n,) in [0, 1), without `within`."""
+        """The values (n,) for shares u (n,) in (0, 1), without `within`."""
         return self.mean + self.sigma * standard_normal(u)
 
 
@@ -107,7 +107,7 @@ class LogNormal(Bounded):
     )
 
     def whole(self, u: Vector) -> Vector:
-        """The values (n,) for shares u (n,) in [0, 1), without `within`."""
+        """The values (n,) for shares u (n,) in (0, 1), without `within`."""
         return self.median * exponential(self.sigma * standard_normal(u))
 
 
@@ -156,7 +156,7 @@ def _some(name: str, values: tuple[Any, ...]) -> None:
 
 
 def _uniform(bounds: Interval, u: Vector) -> Numbers:
-    """A number between the bounds for each `u` (n,) in [0, 1), all alike likely."""
+    """A number between the bounds for each `u` (n,) in (0, 1), all alike likely."""
     low, high = bounds
     # Rounding may take the sum beyond a bound.
     return np.clip(low + u * (high - low), low, high)
@@ -170,7 +170,7 @@ def _rising(name: str, bounds: Interval) -> None:
 
 
 def _log_uniform(bounds: Interval, u: Vector) -> Numbers:
-    """A number between the bounds for each `u` (n,) in [0, 1), uniform in its logarithm.
+    """A number between the bounds for each `u` (n,) in (0, 1), uniform in its logarithm.
 
     Clipped, as the exponential of a logarithm may miss a bound by a rounding.
     """
@@ -180,7 +180,7 @@ def _log_uniform(bounds: Interval, u: Vector) -> Numbers:
 
 
 def _triangular(corners: tuple[float, float, float], u: Vector) -> Numbers:
-    """A triangular number for each `u` (n,) in [0, 1).
+    """A triangular number for each `u` (n,) in (0, 1).
 
     It is the inverse of the distribution function at `u`. `corners` are low, mode and high.
     """
@@ -192,7 +192,7 @@ def _triangular(corners: tuple[float, float, float], u: Vector) -> Numbers:
 
 
 def _choice(values: tuple[Any, ...], u: Vector) -> Numbers:
-    """One of `values` for each `u` (n,) in [0, 1), all alike likely; an array of objects (n,).
+    """One of `values` for each `u` (n,) in (0, 1), all alike likely; an array of objects (n,).
 
     It is filled and not made of the tuple: numpy would make strings of mixed values.
     """
@@ -202,13 +202,13 @@ def _choice(values: tuple[Any, ...], u: Vector) -> Numbers:
 
 
 def _integers(bounds: tuple[int, int], u: Vector) -> Numbers:
-    """A whole number between the bounds, both included, for each `u` (n,) in [0, 1)."""
+    """A whole number between the bounds, both included, for each `u` (n,) in (0, 1)."""
     low, high = bounds
     return low + _place(high - low + 1, u)
 
 
 def _place(count: int, u: Vector) -> npt.NDArray[np.int64]:
-    """Which of `count` values each share u (n,) in [0, 1) falls on."""
+    """Which of `count` values each share u (n,) in (0, 1) falls on."""
     return np.minimum((u * count).astype(np.int64), count - 1)
 
 
@@ -276,7 +276,7 @@ class Distribution(Component):
         return [name for name in WAYS if getattr(self, name) is not None]
 
     def at(self, u: Vector) -> Numbers:
-        """The value (n,) for every u (n,) in [0, 1)."""
+        """The value (n,) for every u (n,) in (0, 1)."""
         (name,) = self.given_keys
         return WAYS[name][1](getattr(self, name), u)
 

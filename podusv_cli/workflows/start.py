@@ -359,6 +359,7 @@ def _fill_template(title: str, boat: str, study: str, way: StartingLegs | None, 
         "speed": f"{speed:g}",
         "about_way": way.about,
         "way": "\n".join(way.lines),
+        # In whole tens of seconds; TIME is the allowance over the time at this speed.
         "duration": f"{10.0 * math.ceil(0.1 * TIME * way.length / speed):g}",
         "study": study,
     }

@@ -73,6 +73,7 @@ def _profile(axes: Axes, made: pd.DataFrame) -> None:
 
     `made` has the rows of one vessel.
     """
+    # Enough points that the steps look upright in print.
     ratios = np.geomspace(1.0, WORST, 300)
     for place, law in enumerate(made.law.unique()):
         color, linestyle, _ = nth_style(place)

@@ -145,6 +145,8 @@ class Cluster:
             worker: self._client.submit(remote.report, text, plugins, workers=[worker], pure=False)
             for worker in sorted(self._threads)
         }
+        # All workers report at the same time, so they share one limit; the last one still gets 0.1
+        # s.
         end = time.monotonic() + REPORTING
         for worker, future in reports.items():
             self._check(worker, future, max(0.1, end - time.monotonic()))

@@ -67,12 +67,12 @@ def draws(sweep: Sweep, first: int, count: int, stream: str = SWEEP) -> Iterator
 
 
 def _random(sweep: Sweep, first: int, count: int, stream: str) -> dict[str, Vector]:
-    """Independent shares (count,) in [0, 1) by quantity."""
+    """Independent shares (count,) in (0, 1) by quantity."""
     return {name: uniforms(sweep.seed, name, first, count, stream) for name in sweep.vary}
 
 
 def _sobol(sweep: Sweep, first: int, count: int, stream: str) -> dict[str, Vector]:
-    """Sobol' points (count,) in [0, 1) by quantity, from point number `first` on.
+    """Sobol' points (count,) in (0, 1) by quantity, from point number `first` on.
 
     Each dimension is shifted by its own random digits. The shift is a digital one (XOR): it
     randomizes the points and keeps how evenly they lie.
@@ -89,6 +89,7 @@ def _sobol(sweep: Sweep, first: int, count: int, stream: str) -> dict[str, Vecto
         points = (sequence.random(count) * 2.0**SOBOL_BITS).astype(np.uint64)
     shifts = [words(sweep.seed, name, 0, 1, f"{stream} shift") for name in sweep.vary]
     return {
+        # A point's digits move to the top of the word; the shift's further digits fill up the rest.
         name: in_unit_interval((points[:, i] << np.uint64(64 - SOBOL_BITS)) ^ shift)
         for i, (name, shift) in enumerate(zip(sweep.vary, shifts, strict=True))
     }

@@ -107,6 +107,7 @@ def _lay_out(part: Path, study: StudyAbout, identity: str, causes: Causes) -> di
             own = study.metrics[name]
             describe(file[name], {"units": own.unit, "long_name": own.meaning})
         for seal in (SEAL, SEAL_OF_THE_REST):
+            # A seal is a SHA-256 in 64 hexadecimal digits.
             places[seal] = _extent(file, seal, np.uint8, (64,), ())
     with new_file(part, layout.size) as out:
         layout.write_to(out)

@@ -128,6 +128,7 @@ def before_and_after(laws: pd.DataFrame, label: str) -> Figure:
     figure = new_figure(COLUMNS, FRAME + 1.4 * ROW * len(ordered))
     axes = figure.add_subplot()
     for row, law in ordered.iterrows():
+        # Both bars of a law lie on either side of its line.
         place = float(str(row))
         _draw_range(axes, place - 0.16, law, "before", "none")
         _draw_range(axes, place + 0.16, law, "after", nth_style(1)[0])
@@ -225,6 +226,7 @@ def importance(table: pd.DataFrame) -> Figure:
     across = min(len(laws), ACROSS - 1)
     down = math.ceil(len(laws) / across)
     most = int(table.groupby("law").size().max())
+    # In inches: 0.13 a bar, and 0.45 for title and axis.
     figure = new_figure(COLUMNS, down * (0.45 + 0.13 * most))
     panels = figure.subplots(down, across, squeeze=False).ravel()
     for law, axes in zip(laws, panels, strict=False):
