@@ -98,7 +98,7 @@ def _state() -> str:
 
 @complete_from_cache
 def starting_points(plugins: Plugins) -> Mapping[str, str]:
-    """Names that `podusv init` takes."""
+    """Names that `podusv init` takes, with their meanings; no plug-in adds any."""
     from podusv_cli.workflows.examples import examples
     from podusv_cli.workflows.init import starting_points
 
@@ -106,7 +106,7 @@ def starting_points(plugins: Plugins) -> Mapping[str, str]:
 
 
 def pages(incomplete: str) -> Offered:
-    """Pages of `podusv docs`."""
+    """Names of pages of `podusv docs` that begin with `incomplete`, with their titles."""
     from podusv_cli.workflows.docs import contents
 
     titles = {name: title for part in contents().values() for name, title in part.items()}
@@ -160,7 +160,7 @@ def exports(incomplete: str) -> Offered:
 
 
 def laws(context: typer.Context, incomplete: str) -> Offered:
-    """The laws of the study that is named before."""
+    """The laws that begin with `incomplete`, of the study named before on the command line."""
     from pathlib import Path
 
     try:

@@ -71,7 +71,7 @@ def _exit_code(done: Repetition) -> int:
 
 
 def _verdict(run: Repeated) -> str:
-    """Whether a run came out again, in one phrase."""
+    """Whether a run came out the same again, in one phrase: bytes, numbers only, or neither."""
     if run.found.same_bytes:
         return f"identical: {run.found.sizes[0]} bytes, sha256 {run.found.digests[0]}"
     if run.identical:

@@ -156,7 +156,7 @@ def _report(done: Swept) -> None:
 
 
 def _next(done: Swept) -> str:
-    """What to do with an unfinished study."""
+    """What to do next with an unfinished study, in words: join its shards, or continue it."""
     if done.part_is_whole:
         return "this shard is done: join all of them with podusv sweep merge"
     from podusv_cli.scenario.plugins import continue_with

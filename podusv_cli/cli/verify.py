@@ -124,7 +124,7 @@ def _show_rankings(rankings: dict[str, Ranking]) -> None:
 
 
 def _in_order(rank: Ranking) -> str:
-    """A ranking in words: labels in order, which are equal, which are too close to tell."""
+    """A ranking of laws in words: labels in order, which are equal, which are too close to rank."""
     if not rank.same:
         return "changes with the step: " + "; ".join(", ".join(o) for o in rank.orders)
     first = rank.orders[0]

@@ -52,8 +52,9 @@ class RunsVerdict(Verdict):
         return is_timed(self.claim)
 
     def evidence(self) -> str:
-        """The numbers and the reason, in one line."""
+        """The claim's numbers and the reason of the verdict, in one line."""
         numbers = (
+            # An infinite number is a time that never comes; NaN is a number that is unknown.
             f"{text} = {number:.4g}" if math.isfinite(number) else f"{text}: never"
             for text, number in self.numbers.items()
             if not math.isnan(number)
@@ -99,7 +100,10 @@ def judge(
     runs: Mapping[str, ClaimedRun],
     metrics: Mapping[str, MetricAbout] = METRICS,
 ) -> list[RunsVerdict]:
-    """A verdict on every claim; `runs` by label."""
+    """A verdict on every claim, in the order of `claims`.
+
+    `runs` are by label; `metrics` are those that claims may name.
+    """
     return [_verdict(parsed, runs, metrics) for parsed in claims]
 
 

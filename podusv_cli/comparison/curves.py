@@ -80,7 +80,10 @@ def metric(label: str, run: ClaimedRun, about: MetricAbout) -> float:
 
 
 def signal(label: str, run: ClaimedRun, name: str) -> Curve:
-    """A signal of a run. Raises CannotTell."""
+    """A signal of a run as a curve, over the times that it was logged at.
+
+    `label` is the run's in claims. Raises CannotTell where the run has no such signal.
+    """
     values = run.signal(name) if run.has(name) else np.empty(0)
     if not len(values):
         raise CannotTell(f"{label}.{name}: {label} {run.ending or 'does not log it'}")

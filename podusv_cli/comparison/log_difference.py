@@ -130,7 +130,7 @@ class LogDifference:
         return not any(parts) and len(set(self.rows)) == 1
 
     def as_json(self) -> dict[str, Any]:
-        """The difference as plain data."""
+        """The difference as plain data, for --json and for files."""
         return {
             "same": self.same,
             "rows": list(self.rows),

@@ -149,7 +149,10 @@ def as_report(
     provenance: Mapping[str, Any],
     missing: Iterable[object] = (),
 ) -> str:
-    """The HTML report; `figures` are the files of `draw_comparison`, `missing` what failed."""
+    """The HTML report; `figures` are the files of `draw_comparison`, `missing` what failed.
+
+    `title` is its heading, `provenance` that of the comparison.
+    """
     pictures: list[Picture] = []
     if figures:
         from podusv_cli.figures.drawing import PHONE, figures_of  # matplotlib is slow to import

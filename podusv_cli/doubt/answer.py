@@ -199,7 +199,7 @@ def describe_turn(turn: Turn) -> str:
 
 
 def as_json(answer: DoubtAnswer) -> dict[str, Any]:
-    """An answer as plain data."""
+    """An answer as plain data, as the doubt's JSON file has it."""
     return {
         **answer.verdict.as_json(),
         "word": answer.word,

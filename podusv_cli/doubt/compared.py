@@ -41,7 +41,10 @@ class ClaimNumber(NamedTuple):
             return float(np.divide(left, right)) if self.right else left
 
     def spread(self, claim: str, worlds: Sequence[Judged]) -> Spread:
-        """Its spread over the draws that have it."""
+        """The 5, 50 and 95 % quantiles of the claim's number over `worlds`, the draws.
+
+        Draws without the number are left out; NaN where no draw has it.
+        """
         drawn = np.array([self.of(world.numbers.get(claim, {})) for world in worlds])
         finite = drawn[np.isfinite(drawn)]
         # Of NaN alone, quantiles are NaN.

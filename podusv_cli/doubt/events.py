@@ -35,7 +35,7 @@ class Event(NamedTuple):
         return abs(self.time - self.edge)
 
     def __str__(self) -> str:
-        """A sentence."""
+        """The event as a sentence: what a run's signal becomes, and how near a window's edge."""
         side = "before" if self.time < self.edge else "after"
         return (
             f"{self.signal} of {self.run} becomes {self.value:g} at {self.time:g} s, "

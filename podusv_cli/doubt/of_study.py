@@ -40,7 +40,7 @@ def study_choices(scenario: Scenario) -> list[Choice]:
 
 
 def _laws(scenario: Scenario) -> Singles:
-    """The scenario of each law that the study has."""
+    """The scenario of each law that the study has, by label: all, or those of `sweep.laws`."""
     assert scenario.sweep
     wanted = scenario.sweep.laws
     return {

@@ -116,7 +116,10 @@ def number(node: ast.expr) -> float:
 
 
 def literal(node: ast.expr) -> float:
-    """A number as written. Raises ExpressionError."""
+    """A number as it is written in an expression.
+
+    Raises ExpressionError for another node, and for numbers beyond LARGEST.
+    """
     number = getattr(node, "value", None)
     if isinstance(number, bool) or not isinstance(number, (int, float)):
         refuse(node, "not a plain number")

@@ -287,7 +287,10 @@ def _texts(axis: Axis) -> list[str]:
 
 
 def _visible_ticks(axis: Axis, locations: Locations) -> Any:
-    """Which ticks lie on the axis."""
+    """Which ticks at `locations` (n,) lie on the axis, as a mask (n,).
+
+    RASTER of the axis's length is allowed beyond both ends, for rounding.
+    """
     change = axis.get_transform().transform
     low, high = sorted(change(np.asarray(axis.get_view_interval(), float)))
     at, room = change(np.asarray(locations, float)), RASTER * (high - low)

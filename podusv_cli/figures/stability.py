@@ -58,6 +58,7 @@ def stability(runs: Sequence[Shown], columns: int) -> Figure:
     V of a single run is stacked by its terms, with its bound over the stack.
     """
     runs = [run for run in runs if run.has("V")]
+    # In inches: 1.5 a panel, of which two have all runs, and 0.6 for the keys.
     figure = new_figure(columns, 3.6 + 1.5 * len(runs))
     over_time = figure.subplots(2 + len(runs), 1, sharex=True)
     draw_V = _curves if len(runs) > 1 else _stack
@@ -104,6 +105,7 @@ def _ultimate(axes: Axes, runs: Sequence[Shown]) -> None:
             else:
                 size = f"{bound:.2g}, not drawn" if math.isfinite(bound) else "none"
                 lines.append(f"bound of {run.name} from {start:g} s on: {size}")
+    # The axis is logarithmic: the room above is that of a factor of two.
     axes.set_ylim(top=2.0 * top)
     axes.plot([], [], color="#444444", linewidth=THIN, label=r"thin: bound $\Delta/2\lambda$")
     if lines:

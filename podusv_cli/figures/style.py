@@ -61,7 +61,7 @@ class Look:
     style: Style = STYLES["podusv"]
 
     def given_to(self, figure: Figure) -> Figure:
-        """The figure in this size, where one is given."""
+        """The figure, resized if it is a page and the look has a size of its own."""
         width = self.width or self.style.widths[self.columns]
         if isinstance(figure, Page) and (width != figure.get_figwidth() or self.height):
             figure.resize(width, self.height or figure.get_figheight())

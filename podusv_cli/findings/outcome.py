@@ -111,6 +111,7 @@ def _through_water(log: Recording) -> tuple[Vector, Vector, Vector]:
     """u, v [m/s] and r [rad/s] of the hull relative to the water around it; each (rows,)."""
     u, v = log["u"], log["v"]
     if "V_c" in log:
+        # The current V_c [m/s] runs towards beta_c [rad]; here are its components along u and v.
         u = u - log["V_c"] * np.cos(log["beta_c"] - log["psi"])
         v = v - log["V_c"] * np.sin(log["beta_c"] - log["psi"])
     return u, v, log["r"]

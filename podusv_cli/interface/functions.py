@@ -330,7 +330,7 @@ def request(out: Any, force: bool, figures: bool) -> Request:
 
 
 def _open_member(member: Member) -> Run:
-    """A finished run of a comparison's folder."""
+    """The finished run that a `member` of a folder is, with the warnings that it kept."""
     there = member.folder
     assert there is not None  # the members of a folder are finished
     warned = tuple(map(str, json_files.read_as(there.path / "metrics.json", _Noticed).warnings))

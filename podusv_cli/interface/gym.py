@@ -98,7 +98,10 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
         observe: Observe | None = None,
         limits: Limits | None = None,
     ) -> None:
-        """No episode has begun."""
+        """Check the task and compile its loop; the first episode begins with `reset`.
+
+        Arguments are described at the class.
+        """
         terms = Terms(period, reward, observe, limits)
         self._task = task = EpisodeTask(source, changes, terms)
         EzPickle.__init__(self, task.whole, **terms._asdict())
@@ -119,7 +122,10 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
 
     @with_short_traceback
     def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Vector, Info]:
-        """Begin a run; see the class. `options` change nothing."""
+        """Begin a run; its first observation (numbers,) and its time, {"time": 0.0} [s].
+
+        `seed` is the number of a draw, see the class. `options` change nothing.
+        """
         seed = None if seed is None else self._task.seed(seed)
         super().reset(seed=seed)
         scenario = self._task.draw_scenario(seed, self.np_random)
@@ -182,7 +188,11 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         observe: Observe | None = None,
         limits: Limits | None = None,
     ) -> None:
-        """No episode has begun."""
+        """Check the task and plan marches of several runs; the first episodes begin with `reset`.
+
+        Arguments are described at the class. Raises UsageError where runs cannot march side by
+        side.
+        """
         if whole(changes) >= 0:
             raise UsageError(f"podusv.gym: {changes} stands for `changes`; write count={changes}")
         if (number := whole(count)) < 1:
@@ -214,7 +224,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
     ) -> tuple[Vector, Info]:
-        """Begin a run in every environment; `options` change nothing."""
+        """Begin a run in every environment; first observations (environments, numbers) and times.
+
+        `seed` is the first of as many numbers of draws, or one for each. `options` change nothing.
+        """
         seeds = self._seeds(seed)
         super().reset(seed=seeds[0])
         self._marches = self._begin_runs(range(self.num_envs), seeds)

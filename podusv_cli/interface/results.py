@@ -312,7 +312,7 @@ def _html(lines: list[str], runs: Mapping[str, Run], table: str) -> str:
 
 
 def _picture(runs: Mapping[str, Run]) -> str:
-    """The tracks as an image inside HTML."""
+    """The tracks of runs (by label) as a PNG inside an HTML image."""
     from podusv_cli.figures.style import image
 
     content: Any = image(figure(runs, ("trajectory",), 1), "png")

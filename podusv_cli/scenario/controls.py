@@ -128,6 +128,7 @@ def _of_waypoints(at: Route, points: Sequence[Sequence[float]]) -> Iterator[Knob
 
     `points` are (n, 2), `at` the steps to the list.
     """
+    # A single point has no extent: it moves by 1 m.
     reach = max(max(axis) - min(axis) for axis in zip(*points, strict=True)) or 1.0
     for row, point in enumerate(points):
         for column, (name, now) in enumerate(zip(("north", "east"), point, strict=True)):

@@ -169,7 +169,7 @@ class Key:
         return self._key(name, field) if field else None
 
     def _key(self, name: str, field: FieldInfo) -> Key:
-        """The key of the field `name` in this section."""
+        """The key of the field `name` in this section, with the section's default for it."""
         model = self.section or self.model
         # A section that is left out is its default, whatever its own class would start with.
         given = isinstance(self.default, model)

@@ -105,7 +105,7 @@ def _without(node: Node, *keys: str) -> Node:
 
 
 def extended_files(node: Node) -> tuple[Node, ...]:
-    """The file names in `extends`."""
+    """The nodes of the file names in `extends`, which may be one or a list; maybe none."""
     above = node.mapping.get("extends")
     if above is None:
         return ()

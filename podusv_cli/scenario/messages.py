@@ -172,7 +172,7 @@ def _no_kind(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
 
 
 def _unknown_kind(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
-    """A kind that `section` has not."""
+    """A fault for a kind that `section` has not, with the kinds that it has."""
     route = (*section.path, "kind")
     node = follow(root, route)[-1]
     what = f"kind {describe_found(node.content, node.text)}"

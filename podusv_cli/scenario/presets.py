@@ -186,6 +186,7 @@ def _nominal(root: Node, plugins: Plugins, faults: list[Fault]) -> Node:
 def _from_preset(given: Node, key: str, plugins: Plugins, faults: list[Fault]) -> Node:
     """The vessel's values over those of its preset, where it has one; `key` is its section."""
     preset = given.mapping.get("preset")
+    # An empty text says that the vessel has no preset.
     if preset is None or preset.content == "":
         return _check_required(given, key, plugins, faults)
     vessel = _over_preset(given, key, VESSELS, plugins, faults)

@@ -326,7 +326,7 @@ def _at(place: Any, index: int) -> Any:
 
 
 def _number(part: Any) -> float:
-    """A number of a file. Raises RouteFault."""
+    """A latitude or longitude of a file as a number. Raises RouteFault."""
     text = str(part).strip()
     if not NUMBER.fullmatch(text) or not math.isfinite(float(text)):
         raise RouteFault("has a waypoint whose latitude or longitude is no number")

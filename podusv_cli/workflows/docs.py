@@ -53,6 +53,7 @@ class Section:
             return 0
         named = self.level == 1 and all(word.search(self.page) for word in words)
         headed = all(word.search(self.heading) for word in words)
+        # The rarest word decides, and no page wins by its length alone (MOST).
         count = min(len(word.findall(self.text)) for word in words)
         weight = IN_TITLE if self.level == 1 else IN_HEADING
         return IN_NAME * named + weight * headed + min(count, MOST)

@@ -416,7 +416,7 @@ def _is_loaded(steps: Route) -> bool:
 
 
 def assignments_of(moved: Moved) -> list[str]:
-    """Values as `--set` takes them."""
+    """Moved values as `--set` takes them, KEY=VALUE; words stand without quotes."""
     return [
         f"{key}={value if isinstance(value, str) else json.dumps(value)}"
         for key, value in moved.items()

@@ -330,7 +330,10 @@ def _of_dimensions(
 
 
 def _of_preset(preset: str, way: StartingLegs | None, out: Path) -> str:
-    """The scenario's text for a vessel of podusv with its thrusters."""
+    """The scenario's text for a vessel of podusv with its thrusters.
+
+    `way` has the legs of a route, if one is given; `out` names the scenario in messages.
+    """
     boat = (
         f"vessel: {{preset: {preset}}} # its source and validity: podusv explain {preset}\n"
         f"actuator: {{kind: pod, preset: {preset}}}"

@@ -115,7 +115,7 @@ def _search_optimum(
 
 
 def table(optima: Iterable[Least]) -> pd.DataFrame:
-    """A row for each case that has an optimum."""
+    """A row for each case that has an optimum: IAE [m s], finest step [s], and how it was found."""
     rows = [
         (*place, optimum.iae, optimum.step, optimum.lowered, optimum.start)
         for optimum in optima

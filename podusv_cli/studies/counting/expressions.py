@@ -129,7 +129,10 @@ class OfOneRun(OfRuns):
         return np.where(self.ended, self.countable(name, values, ~self.ended), np.nan)
 
     def property(self, node: ast.expr) -> Condition:
-        """`finished`."""
+        """Whether runs finished: `finished` is the only property that stands alone.
+
+        Raises ExpressionError for anything else.
+        """
         if not isinstance(node, ast.Name):
             refuse(node, "not a condition; compare metrics with numbers, or write finished alone")
         known_name(node.id, (FINISHED,), "property")

@@ -44,7 +44,7 @@ class Unit:
         return range(self.first, self.first + self.count)
 
     def halves(self) -> tuple[Unit, Unit]:
-        """The unit as two, to find a run that crashes."""
+        """The unit as two halves; repeated halving finds the run that crashes a process."""
         half = self.count // 2
         return (
             Unit(self.law, self.cell, self.first, half),

@@ -206,7 +206,7 @@ class StudyDriver:
         return self
 
     def __next__(self) -> tuple[int, StudyPlan, Unit]:
-        """The next unit, with its number."""
+        """The next unit with a number of its own and the plan; StopIteration at the end."""
         unit = self._next()
         if unit is None:
             raise StopIteration

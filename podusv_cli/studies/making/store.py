@@ -158,9 +158,10 @@ class Store:
     def _these(
         self, earlier: Sequence[runs_file.RunsTable], units: Sequence[Path]
     ) -> Iterator[UnitResult]:
-        """What runs.h5 has already, and these units, each with all metrics of the study.
+        """The results in `earlier` tables and in `units`, each with all metrics of the study.
 
-        Raises StorageError where a unit has metrics that study.json does not know.
+        `units` are files of results. Raises StorageError where a unit has metrics that study.json
+        does not know.
         """
         there = (result for table in earlier for result in table.results())
         for result in chain(there, filter(None, (read(path, self.seal) for path in units))):

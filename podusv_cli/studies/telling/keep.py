@@ -65,6 +65,7 @@ def wanted_runs(results: Results) -> list[KeptRun]:
             *(w for name, count in keep.worst.items() for w in _worst(results, law, name, count)),
             *_name_runs(results.runs, law, keep.draws),
         ):
+            # Law, cell and draw name a run; of several reasons to keep it, the first counts.
             chosen.setdefault(run[:3], run)
     return list(chosen.values())
 

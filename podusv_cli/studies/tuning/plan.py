@@ -120,7 +120,7 @@ class TunePlan:
 
     @property
     def size(self) -> str:
-        """How many runs there are, in words."""
+        """How many runs the searches and their validation take, in words."""
         search, other = (sum(n) for n in zip(*self.runs_wanted().values(), strict=True))
         tune = self.tune
         return (

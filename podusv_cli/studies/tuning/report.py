@@ -25,7 +25,10 @@ FEW = 15  # pairs that are shown at once
 def page(
     folder: Path, results: SearchResults, figures: Sequence[Picture], missing: Sequence[Failure]
 ) -> str:
-    """The whole report."""
+    """The whole report as HTML.
+
+    `folder` is that of the search, `missing` what could not be drawn or written.
+    """
     plan = results.plan
     assert plan.scenario.sweep
     numbered = [*enumerate(figures, 1)]
@@ -113,7 +116,10 @@ def spread(row: Any) -> str:
 
 
 def place(row: Any) -> str:
-    """The ranks that the law may have."""
+    """The ranks that the law may have, from the best to the worst; a dash where they are unknown.
+
+    `row` is one of the answer's table.
+    """
     low, high = row["place_low"], row["place_high"]
     if math.isnan(low):
         return "-"

@@ -61,7 +61,7 @@ class SearchResults:
 
     @property
     def runs_spent(self) -> dict[str, int]:
-        """The simulated runs of the search by law."""
+        """How many runs the searches of each law simulated, by law."""
         return {
             law: sum(trial.runs for repeat in repeats for trial in repeat)
             for law, repeats in self.trials.items()
