@@ -93,7 +93,10 @@ def _report(done: Verification) -> None:
 
 
 def _show_run(label: str, run: RunVerification, done: Verification) -> None:
-    """Print a run's numbers at each step, their order and error, and where one ended early."""
+    """Print a run's numbers at each step, their order and error, and where one ended early.
+
+    `label` is the run's; `done` has the tolerance and the units of all runs.
+    """
     steps = [f"{level.step:.6g} s" for level in run.levels]
     rows = [
         [name, done.units.get(name, "m"), *_cells(e, done.tolerance)]

@@ -212,7 +212,7 @@ def _pair_signals(one: Recording, other: Recording) -> Iterator[_Pair]:
 
 
 def _shared_times(one: Vector, other: Vector) -> tuple[Vector, Any, Any]:
-    """The common times (n,) [s], and their rows in each recording.
+    """The common times (n,) [s] of two logs, and their rows in each recording.
 
     Where logs of one length differ in half of their times or fewer, these are damaged values on one
     grid, and the logs are compared row by row.

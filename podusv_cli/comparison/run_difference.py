@@ -82,7 +82,7 @@ def relative(one: float | None, other: float | None) -> float | None:
 
 
 def difference(one: RunFolder, other: RunFolder) -> RunDifference:
-    """Compare two opened run folders. Raises StorageError.
+    """Compare two opened run folders: log, scenario, versions and metrics. Raises StorageError.
 
     A log that is missing, as it was not packed, is compared by its digest.
     """

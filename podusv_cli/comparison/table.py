@@ -205,7 +205,10 @@ def cells(
     *,
     chosen: Sequence[str] = (),
 ) -> list[list[str]]:
-    """The `rows` as text: what the metric is, unit, a text a run, and the metric's name."""
+    """The `rows` as text: what the metric is, unit, a text a run, and the metric's name.
+
+    The arguments are those of `rows`.
+    """
     return [
         [metric.row, metric.unit, *texts, metric.name]
         for metric, texts in rows(frame, known, unsettled, chosen=chosen)
@@ -220,7 +223,7 @@ def head(frame: MetricTable) -> list[str]:
 def _metrics_without_best(
     frame: MetricTable, known: Mapping[str, MetricAbout] = METRICS
 ) -> list[str]:
-    """Metrics in which no run is marked best.
+    """Metrics in which no run is marked best; `known` describes the metrics by name.
 
     Measured times vary. Where a law keeps a standoff, being nearer to the target is not better.
     Larger margins are better, and the least number is marked.

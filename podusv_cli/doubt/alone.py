@@ -220,8 +220,8 @@ def _golden(
 ) -> None:
     """Narrow `around` (distances a < b < c) to where the claim's number is nearest its limit.
 
-    By the golden section. It stops where a verdict turns, or where a turn would need a steeper
-    fall.
+    By the golden section, with `away` for how far the number is from its limit at a distance. It
+    stops where a verdict turns, or where a turn would need a steeper fall.
     """
     a, b, c = around
     for _ in range(LOOKS):

@@ -173,7 +173,8 @@ def _nearest(
 ) -> tuple[ClaimNumber, Spread]:
     """The number of a claim that is nearest to its limit, and its spread over the draws.
 
-    Distances are compared in half-widths of each number's spread.
+    `base` is the scenario as it is, `worlds` are the draws. Distances are compared in half-widths
+    of each number's spread.
     """
     numbers = compared_numbers(verdict.claim.expect, verdict.claim.tolerance)
     spreads = {n: n.spread(verdict.name, worlds) for n in numbers}

@@ -190,7 +190,7 @@ def _of_places(places: Sequence[Place], singles: Singles) -> Iterator[Choice]:
 def _in_whole_steps(base: Choice, scenario: Scenario, route: Route) -> tuple[float, ...]:
     """Half and twice a time that has to be whole steps, as a sensor's period; nothing for others.
 
-    `route` leads to the time in `scenario`.
+    `base` is the choice of that time so far, `route` leads to the time in `scenario`.
     """
     if base.unit != "s" or not isinstance(base.own, float) or not base.own:
         return ()

@@ -177,7 +177,8 @@ def turned_spans(
 ) -> Iterator[tuple[float, float]]:
     """First and last of neighbouring tried values that turn a claim, as parts of the way to `end`.
 
-    The parts have the sign of the side; a value alone is both.
+    `end` is one of the range's ends, `base` the claims on the scenario as it is. The parts have the
+    sign of the side; a value alone is both.
     """
     own = shown.choice.own
     side = [t for t in shown.trials if (t.value > own) == (end > own)]

@@ -49,7 +49,10 @@ def _laws(scenario: Scenario) -> Singles:
 
 
 def _is_taken(choice: Choice, taken: set[str]) -> bool:
-    """Whether the study draws it, or has cells of it or of a section that it is in."""
+    """Whether the study draws a choice, or has cells of it or of a section that it is in.
+
+    `taken` are the keys that the study draws or has cells of.
+    """
     keys = {public(place) for place in choice.places}
     return any(
         key == drawn or key.startswith((f"{drawn}.", f"{drawn}["))

@@ -75,7 +75,10 @@ def _explore_choice(
     numbers: Mapping[str, Sequence[ClaimNumber]],
     tell: Callable[[float], None],
 ) -> TriedChoice:
-    """`explore_choice` as a job of a process, which an interrupt ends at once."""
+    """`explore_choice` as a job of a process, which an interrupt ends at once.
+
+    The arguments are its own; `tell` is not called, as a job has to take it.
+    """
     with interrupts_enabled():
         return explore_choice(choice, judge, base, numbers)
 

@@ -74,7 +74,7 @@ def path_breaks(case: Case, what: str) -> Sentences:
 
 
 def _path_break(code: str, what: str, remedy: str) -> FindingKind:
-    """The finding on a jump of the target's position, velocity or acceleration."""
+    """The finding on a jump of the target's `what`: position, velocity or acceleration."""
     return warn_before_run(
         code,
         about="path",

@@ -341,7 +341,7 @@ def _open_member(member: Member) -> Run:
 def _runs_compared(done: comparing.Compared, scenarios: Mapping[str, Scenario]) -> dict[str, Run]:
     """The runs of a comparison that have a log, by label.
 
-    `scenarios` are those of runs made now.
+    `done` is the comparison; `scenarios` are those of runs made now.
     """
     result = done.result
     return {

@@ -170,7 +170,8 @@ class EpisodeTask:
     def _limits(self, given: Limits | None) -> Vector:
         """Largest surge force [N], yaw moment [N m] and, of an actuator with one, sway force [N].
 
-        Shape (2,) or (3,). Raises UsageError.
+        Shape (2,) or (3,). `given` are the user's own, None for those of the actuator. Raises
+        UsageError.
         """
         limits = numbers(self.scenario.actuator.limits() if given is None else given)
         most, example = "surge force and yaw moment", "limits=(8.0, 2.5) [N, N m]"
@@ -213,7 +214,10 @@ class EpisodeTask:
         return most
 
     def seed(self, given: Any) -> int:
-        """A seed, which is the number of a draw. Raises UsageError."""
+        """A seed as a number: that of a draw, from 0 on.
+
+        Raises UsageError for anything else, and beyond the last Sobol' point.
+        """
         if (number := whole(given)) < 0:
             raise UsageError(f"podusv.gym: the seed is {given!r}; give a whole number from 0 on")
         if not self.sweep.independent and number >= 2**SOBOL_BITS:

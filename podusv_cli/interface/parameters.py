@@ -67,7 +67,10 @@ def in_si(scenario: Scenario, given: Columns) -> Columns:
 
 
 def scenarios(scenario: Scenario, given: Columns) -> list[Scenario]:
-    """The scenario of every run. Raises ParameterError for unknown keys and values out of range."""
+    """The scenario of every run; `given` are the values of its keys, one a run.
+
+    Raises ParameterError for unknown keys and values out of range.
+    """
     steps = {key: _steps(scenario, key) for key in given}
     whole = {key for key, at in steps.items() if is_whole(describe_key(scenario, at))}
     made = []
@@ -136,7 +139,8 @@ def check_words(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns)
 def _check_ends(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns) -> None:
     """Raise ParameterError where the ends of numbers differ in structure from the first run.
 
-    A loop that cannot be made at all is left to the batch, which says so in its row.
+    `loops` are those of the runs, `given` the values by key. A loop that cannot be made at all is
+    left to the batch, which says so in its row.
     """
     numbers = {key: column for key, column in given.items() if not any(map(_is_word, column))}
     grid = scenario.time_grid()

@@ -187,7 +187,10 @@ def _rows_named(name: str, top: Key, plugins: Plugins) -> list[ExplainRow]:
 
 
 def _presets(name: str, top: Key) -> list[ExplainRow]:
-    """Every preset of this name: where its numbers come from, and what they hold for."""
+    """Every preset of this name: where its numbers come from, and what they hold for.
+
+    `top` is the scenario's key, with all sections below it.
+    """
     plugins = top.scenario.plugged
     return [
         ExplainRow(

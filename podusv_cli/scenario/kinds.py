@@ -98,7 +98,8 @@ def _lost_keys(base: Node, own: Node, key: Key, at: Route) -> list[str]:
 def _sized_for_another(base: Node, own: Node, key: Key, at: Route) -> list[str]:
     """A sentence on numbers kept from another kind that may have been its defaults, or none.
 
-    A section that is written out has them all as numbers, as if each had been chosen.
+    `base` and `own` are the section below and above, `at` leads to it, `key` describes it. A
+    section that is written out has them all as numbers, as if each had been chosen.
     """
     old, new = (key.kinds.get(node.word("kind")) for node in (base, own))
     if not old or not new or old.kind == new.kind or not base.mapping.keys() >= old.keys.keys():

@@ -105,7 +105,10 @@ def _hint_of_blank(section: Key, name: str) -> str:
 
 
 def _several(section: Key, given: Node) -> str:
-    """`; for several write a list: ...`, where a section has kinds for keys and may be a list."""
+    """`; for several write a list: ...`, where a section has kinds for keys and may be a list.
+
+    `given` is the section as written, `section` its key. "" elsewhere.
+    """
     whole = section.top.follow(section.path)[0] if section.path else section
     keys = {name for kind in whole.kinds.values() for name in kind.keys}  # `file` is both
     kinds = [name for name in given.mapping if name in whole.kinds and name not in keys]

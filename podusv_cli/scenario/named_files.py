@@ -115,8 +115,8 @@ def _under(
 ) -> Node:
     """A section over the values that another program's file has, in place of the file's name.
 
-    `key` names the file. `values_of` reads its text: the values, and sentences on what is left out,
-    which are added to `remarks`.
+    `given` is the section, and `key` names the file. `values_of` reads its text: the values, and
+    sentences on what is left out, which are added to `remarks`.
     """
     file = given.mapping.get(key)
     if not file or not isinstance(file.content, str):
@@ -165,7 +165,10 @@ def _in_folder(name: str, folder: str, mark: Mark, key: str, faults: list[Fault]
 
 
 def without_files(given: Node, section: str, model: type[Component], faults: list[Fault]) -> Node:
-    """The section as it is; a fault for every file that it names itself, not with `--set`."""
+    """The section (`given`) as it is; a fault for every file that it names, but for `--set`.
+
+    A node that `--set` gives has no line. `section` is its key, `model` its class.
+    """
     preset = ["preset"] if model.presets and given.word("preset").endswith(YAML) else []
     named = (model.rows_of, model.texts_of, model.bytes_of, model.folders_of, model.values_of)
     for key in (*chain.from_iterable(named), *preset):

@@ -77,8 +77,8 @@ class Placing:
     def _rows_as_places(self, text: str) -> RouteFile | None:
         """Rows of latitude and longitude [deg] as a route; None where the rows are something else.
 
-        They have the names `lat` and `lon`, or no names and lie near the scenario's origin. Raises
-        RouteFault.
+        `text` is the file's. The rows have the names `lat` and `lon`, or no names and lie near the
+        scenario's origin. Raises RouteFault.
         """
         header, lines = lines_of(text)
         cells = header.cells if header else []
@@ -207,7 +207,7 @@ def _rows(text: str, name: str, faults: list[Fault]) -> Iterator[Node]:
 
 
 def _row(line: TextLine, mark: Mark, faults: list[Fault]) -> Node:
-    """A line of a file of points as a list of two numbers; faults for what is no such pair."""
+    """A line of a file of points as a node of two numbers [m]; faults for what is no such pair."""
     numbers = [resolve(cell) for cell in line.cells]
     wrong = [isinstance(n, (str, bool)) or n is None for n in numbers]
     # The line is not shown: the file may be one that the user may not read.

@@ -94,8 +94,12 @@ def preset_about(presets: Presets, name: str, plugins: Plugins = ()) -> str:
 
 
 def with_presets(top: Key = SCENARIO) -> dict[str, tuple[type[Component], Presets]]:
-    """Every class of components that has presets, and these, by `section.kind`."""
+    """Every class of components that has presets, and these, by `section.kind`.
+
+    `top` is the scenario's key: with plug-ins, it has their kinds, too.
+    """
     sections = [inner for key in top.keys.values() for inner in (key, *key.kinds.values())]
+    # The nominal vessel is of the class of the vessel, whose presets are listed once.
     return {
         dotted_key(key.route): (key.section, key.section.presets)
         for key in sections

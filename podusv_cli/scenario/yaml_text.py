@@ -145,7 +145,10 @@ def _place(source: str, before: str) -> Mark:
 
 
 def resolve(text: str) -> bool | int | float | str | None:
-    """The value of a plain scalar; a number that is too large becomes infinite."""
+    """The value of a plain scalar: a word of YAML, a number, or else the text itself.
+
+    A number that is too large becomes infinite.
+    """
     if text in WORDS:
         return WORDS[text]
     if INTEGER.fullmatch(text):
@@ -187,8 +190,8 @@ def read(
 ) -> Node | None:
     """The tree of a single YAML document of at most `most` values; None if that is not possible.
 
-    Every fault is appended to `faults`. Marks have lines only where `placed`, and then the files
-    `above` that extend this one.
+    `text` is that of the file `source`. Every fault is appended to `faults`. Marks have lines only
+    where `placed`, and then the files `above` that extend this one.
     """
     reader = _Reader(text, source, faults, placed, most, above)
     try:

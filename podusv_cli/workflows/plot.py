@@ -173,7 +173,10 @@ def _short(member: Member) -> str:
 
 
 def _empty(runs: Sequence[PastRun], shown: Sequence[Shown]) -> dict[str, str]:
-    """Runs of which nothing can be drawn, and how they ended. Raises UsageError if none is left."""
+    """Runs of which nothing can be drawn, and how they ended; `shown` are those to draw.
+
+    Raises UsageError if none is left.
+    """
     drawable = {run.label for run in shown}
     endings = {
         run.label: run.recording.message or "has a single row"

@@ -127,9 +127,10 @@ def start_from(preset: str, out: Path, route: str = "") -> Path:
 
 
 def _write_new(out: Path, text: str, way: StartingLegs | None) -> Path:
-    """Write a scenario that loads, and its schema; the scenario's file.
+    """Write a scenario that loads (`text`) and its schema; returns the scenario's file.
 
-    Raises StorageError where `out` exists, and UsageError where it does not load.
+    `way` has the legs of a user's route. Raises StorageError where `out` exists, and UsageError
+    where the scenario does not load.
     """
     if out.exists():
         raise StorageError(f"{out} exists; name another file with --out")
@@ -142,7 +143,10 @@ def _write_new(out: Path, text: str, way: StartingLegs | None) -> Path:
 
 
 def _check(text: str, out: Path, way: StartingLegs | None) -> None:
-    """Raise UsageError for a scenario that `podusv validate` would refuse."""
+    """Raise UsageError for a scenario that `podusv validate` would refuse.
+
+    With a user's route (`way`), the message has its length as a hint.
+    """
     try:
         load_text(text, str(out), checks=(unknown_codes, limits(insist=""), sweep_faults))
     except ScenarioError as error:
@@ -322,7 +326,11 @@ def _way(route: str, out: Path) -> StartingLegs | None:
 def _of_dimensions(
     hull: Hull, thrusters: Thrusters, way: StartingLegs | None, out: Path, *, known: bool
 ) -> str:
-    """The scenario's text for a boat of these dimensions; `known` says if its speed was given."""
+    """The scenario's text for a boat of these dimensions; `known` says if its speed was given.
+
+    `way` has the legs of a user's route, if any, and `out` names the scenario in messages.
+    """
+    # Estimates have no more than three good digits.
     numbers = {name: float(f"{x:.3g}") for name, x in estimate_vessel(hull).items()}
     boat = "\n".join([*_vessel(hull, numbers, known), "", *_actuator(hull, thrusters)])
     title = f"A boat of {hull.length:g} m; inertia and damping are estimates from its dimensions."
@@ -444,7 +452,10 @@ def _actuator(hull: Hull, thrusters: Thrusters) -> Iterator[str]:
 
 
 def _study(numbers: dict[str, float]) -> Iterator[str]:
-    """What a study and `doubt` vary: factors with the scatter that the estimates have."""
+    """Lines on what a study and `doubt` vary: factors with the scatter that the estimates have.
+
+    `numbers` are the estimates, by key of the vessel.
+    """
     yield ""
     yield "sweep: # hulls that such dimensions leave possible; no law is told: podusv sweep run"
     yield "  draws: 100"

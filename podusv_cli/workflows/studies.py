@@ -138,7 +138,10 @@ def draw(
 
 
 def export(study: Path, form: str, out: Path | None) -> Path:
-    """Write all runs as one table. Raises UsageError, StorageError."""
+    """Write all runs as one table: `form` is csv or parquet, `out` the file (None: in the study).
+
+    Raises UsageError, also for a study without results, and StorageError.
+    """
     if form not in FORMATS:
         raise UsageError(unknown_word(f"format {form!r}", form, FORMATS))
     path = out or study / f"runs.{form}"

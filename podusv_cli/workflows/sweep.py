@@ -106,7 +106,10 @@ def run(config: Config, request: Request, tell: Tell) -> Swept:
 
 
 def _run(store: Store, made: StudyPlan, request: Request, started: datetime, tell: Tell) -> Swept:
-    """Simulate what is missing of a study whose folder is open, and judge it if it is whole."""
+    """Simulate what is missing of a study whose folder is open, and judge it if it is whole.
+
+    `made` is the study's plan; `started` is when the session began.
+    """
     with executor_for(request, store.folder, made.scenario, store.seal) as executor:
         tally, whole = _march_study(store, made, request, started, executor, tell)
     swept = Swept(store.folder, tally, refused=refusals_of(executor))
@@ -131,7 +134,7 @@ def _march_study(
 ) -> tuple[StudyTally, bool]:
     """Simulate what is missing, and note the session; how far the study is, and if it is whole.
 
-    Raises KeyboardInterrupt with what is kept and how to go on.
+    `made` is the study's plan. Raises KeyboardInterrupt with what is kept and how to go on.
     """
     session = SessionLog(store.folder, request.argv, started, made.scenario.plugged)
     seen = StudyTally(0)

@@ -62,7 +62,10 @@ def shipped_bench() -> Path:
 
 
 def cases(wanted: Selection) -> Iterator[BenchCase]:
-    """All cases, one by one. Raises UsageError for a folder or a name, ScenarioError for a file."""
+    """All cases, one by one: each vessel with each task under each condition, with all laws.
+
+    `wanted` says which of them. Raises UsageError for a folder or a name, ScenarioError for a file.
+    """
     for path in wanted.laws:
         _check_laws(path)
     vessels, tasks, conditions = (_choose_files(wanted, axis) for axis in AXES)
@@ -114,7 +117,8 @@ def _check_laws(path: Path) -> None:
 def _choose_files(wanted: Selection, axis: str) -> dict[str, Path]:
     """The chosen files (folders for conditions that differ by vessel) of an axis, by name.
 
-    `axis` is one of AXES. Raises UsageError for a folder or a name that there is not.
+    `axis` is one of AXES, `wanted` has the folder and the names. Raises UsageError for a folder or
+    a name that there is not.
     """
     if not (wanted.folder / axis).is_dir():
         raise UsageError(

@@ -79,7 +79,7 @@ def _number(metrics: Mapping[str, float], name: str) -> float:
 
 
 def with_optima(made: pd.DataFrame, optima: Sequence[Least]) -> pd.DataFrame:
-    """The table with `optimum` [m s] and `of_optimum`, the IAE over it.
+    """The table `made` with `optimum` [m s] and `of_optimum`, the IAE over it.
 
     `optimum` is NaN where none was found. `of_optimum` is inf for a failed run.
     """

@@ -100,7 +100,10 @@ class _ExampleStudy:
 
 
 def parse(text: str, laws: Sequence[str], metrics: Mapping[str, MetricAbout]) -> Parsed:
-    """A claim about these laws and metrics, checked and taken apart. Raises ExpressionError."""
+    """A claim (`text`) about these laws and metrics, checked and taken apart.
+
+    Raises ExpressionError.
+    """
     tree = syntax_tree(text, EXAMPLE)
     # A trial on one draw of ones finds every mistake that the judge would find, by the same walk.
     tried = _Evaluation(_ExampleStudy(laws, list(metrics)), Parsed(tree), metrics)

@@ -56,7 +56,10 @@ class SeenRuns:
             known[:], origins[:] = new_digests, len(self._stores) - 1
 
     def _refuse(self, new: UnitResult, other: Mask, earlier: Store) -> None:
-        """Raises StorageError: the draws in `other` (count,) have other numbers in `earlier`."""
+        """Raise StorageError: draws of the unit `new` have other numbers in `earlier`.
+
+        `other` is a mask (count,) over the unit's draws: those that differ.
+        """
         unit, folder = new.unit, self._stores[-1].folder
         first = unit.first + int(np.argmax(other))
         names = ", ".join(_differing(new, earlier, first))

@@ -113,7 +113,8 @@ def _loops(plan: StudyPlan, unit: Unit) -> list[Callable[[], ClosedLoop]]:
 def alike(part: Part) -> str:
     """A key that is equal for units whose loops differ in numbers, and hardly ever in structure.
 
-    It has the law, the cell and all settings of the law that are no real numbers.
+    `part` is a plan and a unit of it. The key has the law, the cell and all settings of the law
+    that are no real numbers.
     """
     plan, unit = part
     law = plan.single(unit.law, unit.cell).controller.model_dump()

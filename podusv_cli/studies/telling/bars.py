@@ -67,7 +67,10 @@ def _bar(link: Link, part: Statistic) -> Bar:
 
 
 def _axis(link: Link, part: Statistic, *, shares: bool) -> tuple[float, float]:
-    """The ends of an axis with bound and interval on it, and some room; shares end at 0 and 1."""
+    """The ends of an axis with bound and interval on it, and some room; shares end at 0 and 1.
+
+    `link` has the bound, `part` is the statistic with its interval.
+    """
     ends = [n for n in (part.low, part.high, part.estimate, link.bound) if math.isfinite(n)]
     low, high = min(ends), max(ends)
     # Where all of them are one number, a tenth of it, or 1 around zero.

@@ -133,7 +133,7 @@ def _open_kept(path: Path, kept_run: KeptRun, results: Results, extras: Extras) 
 def difference(run: RunFolder, one: KeptRun, runs: RunsTable) -> str:
     """The first metric in which the log of `run` differs from the table, with both values.
 
-    The text is empty if none does.
+    `one` says which run of the table `runs` it is. The text is empty if no metric differs.
     """
     for name in runs.metrics:
         ours, theirs = run.metrics.get(name), float(runs.metric(one.law, name)[one.cell, one.draw])

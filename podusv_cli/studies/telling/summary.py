@@ -103,7 +103,10 @@ def sensitivity(runs: StudyRuns, draws: Mapping[str, Any], level: float, metrics
 
 
 def without_intervals(rows: Rows) -> Rows:
-    """The table with NaN in all columns that need independent draws."""
+    """The table with NaN in all columns that need independent draws.
+
+    These are ends of intervals, and what correlations reach by chance.
+    """
     return [
         {
             name: np.nan if name.endswith(ENDS) or name == "by_chance" else cell

@@ -92,7 +92,10 @@ def parse_objective(text: str, metrics: Mapping[str, Metric]) -> ast.expr:
 
 
 def parse_inequality(text: str, metrics: Mapping[str, Metric]) -> Inequality:
-    """A statistic compared with a number. Raises ExpressionError."""
+    """An inequality (`text`) that compares one statistic of the draws with a number.
+
+    Raises ExpressionError for anything else.
+    """
     tree = syntax_tree(text, INEQUALITY)
     match tree:
         case ast.Compare(left=left, ops=[sign], comparators=[right]) if type(sign) in SIGNS:

@@ -202,7 +202,10 @@ def _known_gains(laws: Mapping[str, Scenario]) -> list[str]:
 
 
 def _refusals_of(label: str, scenario: Scenario, key: str, content: Range) -> Iterator[str]:
-    """What is wrong with a range for one law: the values that its scenario does not take."""
+    """What is wrong with a range (`content`) for one law: the values that it does not take.
+
+    `label` is the law's, `scenario` has it as its controller, and `key` is the gain.
+    """
     law = scenario.controller
     own = getattr(law, key)
     if content.keep:
