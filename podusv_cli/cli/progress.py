@@ -31,7 +31,7 @@ class Bars(Protocol):
     """Bars by name."""
 
     def __call__(self, name: str, fraction: float, patience: float = PATIENCE) -> None:
-        """Draw a bar, so many seconds after the command began or later."""
+        """Draw a bar, but not before the command has run for `patience` [s]."""
 
 
 @contextmanager
@@ -105,14 +105,14 @@ def _say_once_after(seconds: float, text: str) -> Callable[[float], None]:
         """Note that `fraction` of the work is done; print `text` once if it takes long."""
         begins.append(time.monotonic())
         if fraction < 1.0 and begins[-1] - begins[0] > seconds:
-            begins[:] = [math.inf]  # from here on less has passed than nothing
+            begins[:] = [math.inf]  # so that `text` is not printed again
             echo(text, err=True)
 
     return tell
 
 
 class StudyLine:
-    """A line on stderr that tells how far a study is; nothing where stderr is no terminal."""
+    """A line on stderr that shows how far a study is; nothing where stderr is no terminal."""
 
     def __init__(self, *, wanted: bool) -> None:
         """Nothing is shown yet."""
@@ -130,7 +130,7 @@ class StudyLine:
             )
 
     def advance(self, tally: StudyTally, text: str) -> None:
-        """Show runs done, time left, and what is told of them."""
+        """Show runs done, time left, and what is said of them."""
         if time.monotonic() - self._last > PERIOD:
             self._show(f"{tally.made} of {tally.wanted} runs", *_left(tally), text)
 

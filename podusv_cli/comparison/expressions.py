@@ -250,7 +250,7 @@ class Evaluation(Walk):
         return curves.reduce_curve(name, ast.unparse(node), curve, settings, window)
 
     def _or_doubt(self, number: Callable[[], float]) -> float:
-        """The number, or NaN where it cannot be told, with the reason among the doubts."""
+        """The number, or NaN where it cannot be known, with the reason among the doubts."""
         try:
             return number()
         except CannotTell as doubt:

@@ -19,7 +19,7 @@ from podusv_cli.storage.run_folder import LOG, RunFolder
 
 Change = tuple[Any, Any]
 Numbers = tuple[float | None, float | None]
-# Keys of provenance.json that are different for every run, or told by the scenario
+# Keys of provenance.json that are different for every run, or given by the scenario
 OF_EACH_RUN = ("argv", "started", "finished", "duration_s", "plugins")
 
 

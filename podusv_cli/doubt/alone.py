@@ -175,14 +175,14 @@ class _Side:
         }  # a value and what is said
 
     def judge_at(self, distance: float) -> Judged:
-        """What the claims say where the choice is so far from the scenario's own value."""
+        """What the claims say with the choice at this `distance` from the scenario's own value."""
         if distance not in self.trials:
             value = self.choice.own + math.copysign(distance, self.end - self.choice.own)
             self.trials[distance] = value, self.judge(world_with(self.choice, value))
         return self.trials[distance][1]
 
     def turns_at(self, distance: float, claim: str) -> bool:
-        """Whether a verdict is the opposite where the choice is so far from its own value."""
+        """Whether a verdict is the opposite with the choice at this distance from its own value."""
         return self.judge_at(distance).contradicts(claim, self.base)
 
     def tried_between(self) -> list[float]:

@@ -47,8 +47,8 @@ class DoubtAnswer:
     unknown: int
     failed: int
     tried: int  # choices that were moved
-    acted: int  # of which so many change a number of the claim
-    silent: int  # of which so many have a value at which nobody can tell
+    acted: int  # how many of them change a number of the claim
+    silent: int  # how many of them have a value that leaves the claim open
     numbers: Mapping[str, float]  # of the claim, by their text
     number: ClaimNumber  # which of its numbers is nearest to its limit
     spread: Spread  # of this number over the draws

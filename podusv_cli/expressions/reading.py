@@ -1,4 +1,4 @@
-"""Reading expressions: a syntax tree within limits, and what every mistake in one is told.
+"""Reading expressions: a syntax tree within limits, and a message for every mistake in one.
 
 They are parsed by Python, and evaluated by whoever gives them a meaning; never run as Python.
 """

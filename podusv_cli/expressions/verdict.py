@@ -109,7 +109,7 @@ class Answered(NamedTuple, Generic[AnyVerdict]):
 def by_answer(verdicts: Sequence[AnyVerdict]) -> list[Answered[AnyVerdict]]:
     """The verdicts with their numbers by answer, an answer that nobody got included.
 
-    Published claims come first. What cannot be told of either kind stands together, last.
+    Published claims come first. Open answers of both kinds stand together, last.
     """
     numbered = [*enumerate(verdicts, 1)]
     kinds = [kind for kind in (True, False) if kind in {v.published for v in verdicts}]

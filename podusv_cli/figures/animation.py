@@ -80,7 +80,7 @@ def _frames(runs: Sequence[Shown]) -> Iterator[Image.Image]:
 
 
 def _gif(frames: Iterator[Image.Image]) -> bytes:
-    """The pictures as a GIF that repeats for ever, with 64 colours each to keep it small."""
+    """The pictures as a GIF that repeats without end, with 64 colours each to keep it small."""
     first, *rest = (frame.quantize(colors=64, dither=Image.Dither.NONE) for frame in frames)
     buffer = io.BytesIO()
     first.save(buffer, "GIF", save_all=True, append_images=rest, duration=FRAME_MS, loop=0)

@@ -11,7 +11,7 @@ from podusv_cli.figures.shown import Shown
 
 TALL = 20.0  # a peak this many times the usual values gets a logarithmic axis
 DECADES = 4  # at most, on the logarithmic axis of runs that finished
-USUAL = 0.1  # of a signal's mean size: where a run settles below this, so much is usual in it
+USUAL = 0.1  # of a signal's mean size: where a run settles below this, this is the usual size
 SAMPLES = 1000  # of a signal, about, for what is usual in it
 DIP = 0.02  # of the run; a distance that is smaller for less than this is a passage
 

@@ -111,7 +111,7 @@ class Shown:
 
     @property
     def line_style(self) -> dict[str, Any]:
-        """Keyword arguments of `Axes.plot`; a legend tells how a run ended that did not finish."""
+        """Keyword arguments of `Axes.plot`; a legend says how a run ended that did not finish."""
         ending = "" if self.whole else f" ({self.recording.status} at {self.end:g} s)"
         return {"color": self.color, "linestyle": self.linestyle, "label": self.name + ending}
 

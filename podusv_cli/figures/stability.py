@@ -24,7 +24,7 @@ from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.theory.lyapunov import TERMS, V_DOT, V
 
 POINTS = 600  # of a stack; every column is a mean, so that no extreme stands for its surroundings
-FAR = 100.0  # a bound this many times above all of V is left out of the picture and told in words
+FAR = 100.0  # a bound this many times above all of V is left out of the picture and given in words
 LAYERS = {
     "z_e": "#0072B2",
     r"\psi_e": "#56B4E9",

@@ -175,7 +175,7 @@ def distances(axes: Axes, runs: Sequence[Shown]) -> None:
 
 
 def _own_distance(runs: Sequence[Shown]) -> str:
-    """The signal that tells how far each run is from what it follows, "" for none."""
+    """The signal of how far each run is from what it follows, "" for none."""
     if all(run.about.follows and run.has(DEVIATION) for run in runs):
         return DEVIATION
     return "z_e" if len(runs) == 1 and runs[0].has("z_e") else ""

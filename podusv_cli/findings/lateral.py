@@ -1,4 +1,4 @@
-"""Findings about laws that steer the velocity: sway answers yaw too much, or not as told."""
+"""Findings about laws that steer the velocity: sway answers yaw too much, or not as assumed."""
 
 from __future__ import annotations
 

@@ -127,7 +127,7 @@ def _through_water(log: Recording) -> tuple[Vector, Vector, Vector]:
     remedy="give the filter the noise that sensors have, with what waves add to it",
 )
 def inconsistent_filter(scenario: Scenario, log: Recording) -> Sentences:
-    """The estimator's own measure of a sensor's noise says that it is told wrong."""
+    """The estimator's own measure of a sensor's noise says that its number is wrong."""
     late = np.flatnonzero(steady_rows(scenario, log))
     if "nis_sum" not in log or not late.size:
         return

@@ -102,7 +102,7 @@ class EpisodeTask:
         Raises UsageError for a reward that the first period does not define, and for functions that
         do not give numbers.
         """
-        # So that mistakes are told before anything is compiled.
+        # So that mistakes are reported before anything is compiled.
         plain = self.scenario.simulation.model_copy(update={"compiled": False})
         scenario = self.scenario.model_copy(update={"simulation": plain})
         plan = scenario.plan()

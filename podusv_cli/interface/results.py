@@ -156,14 +156,14 @@ class Run:
         return xarray.Dataset(arrays, attrs=facts).set_coords("time")
 
     def __getitem__(self, signal: str) -> Vector:
-        """A signal that the log has or that follows from it; KeyError with those that there are."""
+        """A signal that the log has or that follows from it; KeyError names the known ones."""
         if not self.past.has(signal):
             raise KeyError(unknown_word(f"signal {signal!r}", signal, self.recording.signals))
         return self.past.signal(signal)
 
     @with_short_traceback
     def plot(self, *names: str, columns: int = 2) -> Figure:
-        """A matplotlib figure, which notebooks show; `podusv plot --help` tells of the files.
+        """A matplotlib figure, which notebooks show; `podusv plot --help` describes the files.
 
         `names` are that of a figure (`"errors"`), or those of signals, each over time
         (`"psi", "tau_u"`); the trajectory without any. `columns` is its width in columns of a
@@ -212,7 +212,7 @@ class Comparison:
         return page if page.exists() else None
 
     def __getitem__(self, label: str) -> Run:
-        """The run of this label; KeyError with the labels that there are."""
+        """The run of this label; KeyError names the known labels."""
         if label not in self.runs:
             raise KeyError(unknown_word(f"run {label!r}", label, self.runs))
         return self.runs[label]

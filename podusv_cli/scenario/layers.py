@@ -94,7 +94,7 @@ def _bases(node: Node, source: str, faults: list[Fault]) -> Iterator[Node | None
         name, sources = waiting.pop()
         base = _read_base(name, sources, faults)
         tree = _mapping(base[1], base[0], faults, above=sources) if base else None
-        yield tree and _without(tree, "extends", "description")  # which tells of that file alone
+        yield tree and _without(tree, "extends", "description")  # which is about that file alone
         if base and tree:
             waiting += [(further, (*sources, base[0])) for further in extended_files(tree)]
 

@@ -197,7 +197,7 @@ def _wrong(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
     node = follow(root, key.path)[-1]
     if (
         isinstance(node.content, dict) and key.section
-    ):  # that may be a number, too: what is in it is told
+    ):  # that may be a number, too: what is in it is reported
         return
     what = describe_found(node.content, node.text)
     yield Fault(

@@ -29,7 +29,7 @@ SECTIONS = (
     "control",
     "metrics",
 )
-WHICH = ("kind", "preset")  # are told although they equal the default or preset
+WHICH = ("kind", "preset")  # are listed although they equal the default or preset
 
 
 def settings(part: Component, facts: Facts | None = None) -> list[SettingAbout]:

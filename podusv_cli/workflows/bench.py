@@ -66,7 +66,7 @@ def bench(
     anything is simulated, StorageError, and KeyboardInterrupt; then nothing is written.
     """
     if optimum:
-        # So that a missing library is told before hours of runs.
+        # So that a missing library is reported before hours of runs.
         casadi()
     every = list(cases(wanted))
     folder = request.out or RESULTS / "bench"

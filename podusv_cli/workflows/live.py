@@ -67,7 +67,7 @@ Moved = Mapping[str, float | str]  # values by key
 class Base:
     """A scenario that is loaded, into which numbers are put while values move.
 
-    `has_nominal`: the file gives what the laws are told of the hull. `several`: it has
+    `has_nominal`: the file says what the laws assume of the hull. `several`: it has
     `controllers`. `unread` are sentences about claims that these laws have no signals for.
     """
 

@@ -1,4 +1,4 @@
-"""`podusv margins`: loop margins of a scenario's laws, told and kept in a folder."""
+"""`podusv margins`: loop margins of a scenario's laws, printed and kept in a folder."""
 
 from __future__ import annotations
 

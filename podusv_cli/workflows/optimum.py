@@ -116,7 +116,7 @@ def optimum_of(
     target = request.out or free_folder(RESULTS / scenario.name / "optimum")
     size = estimate(scenario, loaded.plan(scenario))
     with RunWriter(target, force=request.force, needed=size.bytes_needed):
-        pass  # a place that cannot be written to is told before anything is computed
+        pass  # fails before anything is computed where the place cannot be written to
     guesses = _guesses(scenario)
     stages, motion = collocation.search_optima(wanted, guesses, step, progress)
     repeated = _repeating(scenario, wanted, motion)

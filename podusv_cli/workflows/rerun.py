@@ -116,7 +116,7 @@ def _scenario(run: RunFolder, request: Request) -> Scenario:
 
 
 def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
-    """Simulate one run again and compare it with what there was."""
+    """Simulate one run again and compare it with the original."""
     # There is exactly one.
     ((original, scenario),) = runs
     label = original.path.name or str(original.path)
@@ -130,7 +130,7 @@ def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition
 
 
 def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
-    """Simulate the runs of a comparison again and compare each with what there was.
+    """Simulate the runs of a comparison again and compare each with the original.
 
     One that cannot be made is among the failures.
     """

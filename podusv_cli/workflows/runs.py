@@ -61,7 +61,7 @@ KINDS = {
 
 @dataclass(frozen=True)
 class ListedRun:
-    """A run, study, search or bench as its files tell of it."""
+    """A run, study, search or bench as its files describe it."""
 
     folder: Path
     kind: str

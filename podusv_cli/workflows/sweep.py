@@ -140,7 +140,7 @@ def _march_study(
     seen = StudyTally(0)
 
     def tell_tally(tally: StudyTally) -> None:
-        """Keep the latest tally, for what is told after an interrupt, and pass it on."""
+        """Keep the latest tally, for the message after an interrupt, and pass it on."""
         nonlocal seen
         seen = tally
         tell(tally)

@@ -64,7 +64,7 @@ def wanted_optima(
         try:
             problem(first, "iae")
         except UsageError as error:
-            # The same reason may come from many cases: it is told once, without the case's name.
+            # The same reason may come from many cases: it is given once, without the case's name.
             refused[str(error).partition(": ")[2]] = None
             continue
         tasks.setdefault(first.model_dump_json(include=TASK), []).append(case)

@@ -248,7 +248,7 @@ def draws_for_share(estimate: float, bound: float, level: float) -> int | None:
 def holm(decides: Callable[[int, float], bool], count: int, level: float) -> list[float]:
     """The level of each of `count` claims by Holm's step-down procedure.
 
-    `decides(i, level)` tells whether claim i is decided by intervals of this level. The claims
+    `decides(i, level)` says whether claim i is decided by intervals of this level. The claims
     that are still open share 1 - level equally; each that is decided leaves more to the others.
     The probability that any claim is decided wrongly is then at most 1 - level.
     """

@@ -351,7 +351,7 @@ def gathered_metrics(scenario: Scenario) -> dict[str, Metric]:
 
 
 def _keep(scenario: Scenario, sweep: Sweep) -> Faults:
-    """Kept runs by a metric or a draw that there is not."""
+    """Kept runs by a metric or a draw that does not exist."""
     metrics = gathered_metrics(scenario)
     for name in sweep.keep.worst:
         if name not in metrics:

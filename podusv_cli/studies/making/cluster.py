@@ -306,7 +306,7 @@ class Cluster:
         except LOST as error:
             raise lost_scheduler(error) from error
         self._threads = {name: worker["nthreads"] for name, worker in workers.items()}
-        # A future that is bound to workers that left would wait for ever.
+        # A future that is bound to workers that left would wait without end.
         for future, task in list(self._running.items()):
             if task.allowed is not None and task.allowed.isdisjoint(self._threads):
                 self._again.append(self._running.pop(future))
@@ -314,7 +314,7 @@ class Cluster:
 
     @property
     def workers(self) -> int:
-        """The threads of all workers that there are now."""
+        """How many threads all present workers have together."""
         return max(1, sum(self._threads.values()))
 
     def provenance(self) -> dict[str, Any]:

@@ -129,7 +129,7 @@ class _Shares:
     def __init__(self, units: Units, done: Done, workers: int) -> None:
         """`units` are dealt to `workers` processes, several a job where they are short.
 
-        `done` is told of each.
+        `done` is called for each.
         """
         self._units, self._done, self._workers = units, done, workers
         self._parts = dict[int, list[tuple[int, StudyPlan, Unit]]]()

@@ -84,7 +84,7 @@ def _worst(results: Results, law: str, name: str, count: int) -> Iterator[KeptRu
     """The `count` successful runs of a law with the largest `name`, over all cells."""
     runs = results.runs
     values = np.where(runs.success(law), runs.metric(law, name), np.nan)
-    # NaN sorts last; only so many are taken as are numbers.
+    # NaN sorts last and is not taken.
     order = np.argsort(-values, axis=None, kind="stable")[: min(count, np.isfinite(values).sum())]
     for rank, place in enumerate(order.tolist(), 1):
         cell, draw = divmod(place, runs.wanted)

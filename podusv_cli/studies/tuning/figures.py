@@ -38,7 +38,7 @@ SMALL: dict[str, Any] = {"fontsize": 6.5}
 
 
 def sketches(results: SearchResults) -> Iterator[Sketch]:
-    """The figures that there are numbers for."""
+    """The figures for which there are numbers."""
 
     objective = results.plan.tune.objective
     yield Sketch(

@@ -19,7 +19,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.studies.tuning.space import Gain
 
 STARTUP = 8  # trials before TPE takes over from random numbers: the first batch
-WORST = 1e30  # what a sampler is told in place of infinity
+WORST = 1e30  # what a sampler gets in place of infinity
 Values = Sequence[float]
 
 

@@ -83,7 +83,7 @@ class GainSearch:
         """The first units of the next batch that has to be simulated; none when the budget is used.
 
         A unit comes with its trial's place in the batch. Batches that an earlier session has
-        finished are told to the sampler without being simulated again.
+        finished are given to the sampler without being simulated again.
         """
         while (left := self.plan.tune.budget - self.runs_spent) > 0:
             self._ask(left)
@@ -228,7 +228,7 @@ class GainSearch:
             )
 
     def _tell_sampler(self, made: Sequence[GainTrial]) -> None:
-        """Give the sampler what came out, and choose the leader of all trials."""
+        """Give the sampler the results, and choose the leader of all trials."""
         self._sampler.tell([t.value for t in made], [t.excesses for t in made])
         self.trials += made
         self.leader = trials.best(self.trials)
