@@ -137,7 +137,10 @@ def compare(
 
 
 def _report(done: Compared, verbose: bool, metrics: Sequence[str]) -> None:
-    """Print the comparison; `verbose` adds all metrics and the time [s] that each part took."""
+    """Print the comparison and where it is.
+
+    `metrics` restricts the table; `verbose` adds all metrics and the time [s] that each part took.
+    """
     echo_comparison(done, metrics, whole=verbose)
     result = done.result
     if verbose:
@@ -158,7 +161,7 @@ def _count_words(past: Sequence[PastRun]) -> str:
 
 
 def echo_comparison(done: Compared, metrics: Sequence[str] = (), *, whole: bool = False) -> None:
-    """Print the table, or only its rows of some metrics, and what the claims came to.
+    """Print the table, or only its rows of `metrics`, and what the claims came to.
 
     A terminal gets the headlines, or these metrics, in as many columns as it has; a pipe, and a
     terminal with `whole`, get all.
@@ -183,7 +186,7 @@ def _echo_whole(done: Compared, metrics: Sequence[str]) -> None:
 
 
 def _echo_brief(done: Compared, metrics: Sequence[str]) -> bool:
-    """Print the laws side by side, or a line each; False without rows or room for them."""
+    """Print the laws side by side, or a line each; False where there are no rows or no room."""
     from podusv_cli.comparison.table import rows, window
 
     result = done.result
@@ -195,6 +198,7 @@ def _echo_brief(done: Compared, metrics: Sequence[str]) -> bool:
         brief=True,
         ratios=False,
     )
+    # A headline that no run has is left out.
     shown = [r for r in every if metrics or (r.metric.headline and {*r.texts} != {"-"})]
     if not shown:
         return False
@@ -204,6 +208,7 @@ def _echo_brief(done: Compared, metrics: Sequence[str]) -> bool:
     labels = result.table.columns
     across = [[text, *row.texts] for text, row in zip(words, shown, strict=True)]
     down = [[label, *(row.texts[i] for row in shown)] for i, label in enumerate(labels)]
+    # Laws across, where they fit; else a line for each law.
     lines = grid(["", *labels], across, columns()) or grid(["", *names], down, columns())
     typer.echo("\n".join(map(visible, lines)))
     if lines:
@@ -217,7 +222,10 @@ def _echo_brief(done: Compared, metrics: Sequence[str]) -> bool:
 def _advice(
     done: Compared, items: Sequence[str], assign: Sequence[str], plugin: Sequence[str]
 ) -> str:
-    """How to find out whether the numbers of the first run that is not verified have converged."""
+    """The command that shows whether the numbers of the first unverified run have converged.
+
+    `items`, `assign` and `plugin` are the arguments of this command.
+    """
     from podusv_cli.workflows.measured import is_log
 
     finished = {run.label: done.place(run) for run in done.result.runs}

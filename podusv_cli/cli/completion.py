@@ -27,9 +27,10 @@ Offered = list[tuple[str, str]]
 def complete_from_cache(
     known: Callable[[Plugins], Mapping[str, str]],
 ) -> Callable[[typer.Context, str], Offered]:
-    """What completes words that are known with these plug-ins, and what each means.
+    """A completion function for typer, of a function that returns words and meanings.
 
-    All of them are cached on disk, but for those of files after `--plugin`.
+    `known` gets the plug-ins at hand. Its words are cached on disk, but for those of plug-in files
+    after `--plugin`.
     """
 
     @wraps(known, assigned=("__name__", "__doc__"), updated=())
@@ -74,7 +75,11 @@ def _folder() -> Path | None:
 
 
 def _state() -> str:
-    """A digest of what podusv, its scenarios and the installed plug-ins are now."""
+    """A digest of podusv's files, its scenarios and the installed plug-ins.
+
+    The words that completion remembers hold as long as it stays the same. Files count by name and
+    time, as reading them at every Tab would be slow.
+    """
     import hashlib
     from pathlib import Path
 
@@ -93,7 +98,7 @@ def _state() -> str:
 
 @complete_from_cache
 def starting_points(plugins: Plugins) -> Mapping[str, str]:
-    """Names that `podusv init` takes."""
+    """Names that `podusv init` takes, with their meanings; no plug-in adds any."""
     from podusv_cli.workflows.examples import examples
     from podusv_cli.workflows.init import starting_points
 
@@ -101,7 +106,7 @@ def starting_points(plugins: Plugins) -> Mapping[str, str]:
 
 
 def pages(incomplete: str) -> Offered:
-    """Pages of `podusv docs`."""
+    """Names of pages of `podusv docs` that begin with `incomplete`, with their titles."""
     from podusv_cli.workflows.docs import contents
 
     titles = {name: title for part in contents().values() for name, title in part.items()}
@@ -118,7 +123,8 @@ def parts(incomplete: str) -> Offered:
 def keys(context: typer.Context, incomplete: str) -> Offered:
     """`controller.k_ze=` for `--set`; after the equals sign the words that the value may be.
 
-    Where the scenario is named before, keys of the kinds that it has; nothing of it is executed.
+    Where the scenario is already on the line, keys of the kinds that it has; nothing of it is
+    executed.
     """
     from pathlib import Path
 
@@ -154,7 +160,7 @@ def exports(incomplete: str) -> Offered:
 
 
 def laws(context: typer.Context, incomplete: str) -> Offered:
-    """The laws of the study that is named before."""
+    """The laws that begin with `incomplete`, of the study named before on the command line."""
     from pathlib import Path
 
     try:

@@ -65,7 +65,10 @@ def _show_changes(what: str, changes: Mapping[str, Change]) -> None:
 
 
 def _show_metrics(difference: RunDifference) -> None:
-    """Print a table of the metrics that differ, and say where the runs end at different times."""
+    """Print a table of the metrics that differ.
+
+    Where the runs end at different times, a sentence says that they do not compare.
+    """
     from podusv_cli.comparison.run_difference import relative
     from podusv_cli.core.plugins import installed_plugins
     from podusv_cli.metrics.table import metrics_with
@@ -89,7 +92,7 @@ def _show_metrics(difference: RunDifference) -> None:
 
 
 def _show_log(log: LogDifference) -> None:
-    """Print the largest difference of each signal, its share of the peak, and its time [s]."""
+    """Print the largest difference of each signal, its part of the peak, and its time [s]."""
     rows = [
         [d.signal, d.unit, _number(d.gap), _number(d.relative_to_peak), _number(d.time)]
         for d in log.largest
@@ -113,7 +116,10 @@ def deviation_in_words(d: Deviation) -> str:
 
 
 def size(d: Deviation) -> str:
-    """How far apart the two numbers are."""
+    """How far apart the two numbers of a deviation are, in words.
+
+    In units in the last place (ulp) up to COUNTABLE, where these say that it is rounding.
+    """
     if math.isinf(d.gap):
         return "one is not finite"
     if d.ulps == 0:
@@ -137,7 +143,7 @@ def change_in_words(key: str, change: Change) -> str:
 
 
 def log_in_words(log: LogDifference) -> Iterator[str]:
-    """Sentences about everything in which two logs differ but the signals' largest differences."""
+    """Sentences on all in which two logs differ, but for each signal's largest difference."""
     if log.first:
         yield f"first difference: {deviation_in_words(log.first)}"
         yield f"{len(log.largest)} of {len(log.compared)} signals differ"

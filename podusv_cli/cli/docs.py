@@ -55,7 +55,7 @@ def _list(wanted: str) -> None:
 
 
 def _show(page: str) -> None:
-    """Print a page: rendered on a terminal, as Markdown in a pipe."""
+    """Print a page: rendered on a terminal, as Markdown in a pipe; `page` is its name."""
     from podusv_cli.workflows import docs as workflow
 
     if not sys.stdout.isatty():

@@ -63,7 +63,8 @@ def with_exit_codes(
 def _exit_code(command: Callable[[], None], interrupts: Interrupts, package: str) -> int:
     """Run a command; 0, or the exit code of its error, which is printed.
 
-    typer's own errors pass: it prints them itself. `package` is whose code a traceback blames.
+    typer's own errors pass: it prints them itself. `interrupts` counts the signals that came.
+    `package` is whose code a traceback blames.
     """
     try:
         command()
@@ -81,7 +82,10 @@ def _exit_code(command: Callable[[], None], interrupts: Interrupts, package: str
 
 
 def report_error(error: BaseException, package: str = "podusv") -> int:
-    """Print an error and return its exit code; a bug is one of the `package`."""
+    """Print an error and return its exit code.
+
+    Users' errors are a line, without a traceback; anything unexpected is a bug of `package`.
+    """
     if isinstance(error, KeyboardInterrupt):
         _print_error(str(error) or "interrupted")
         return INTERRUPTED
@@ -130,7 +134,7 @@ def _with_buffer(stream: TextIO) -> TextIO:
 
 
 def flush_streams(code: str | int | None) -> str | int | None:
-    """Flush stdout and stderr; the exit code, or that of a failure to print."""
+    """Flush stdout and stderr; `code`, or the exit code of a failure to print."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()

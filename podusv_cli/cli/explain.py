@@ -71,7 +71,7 @@ def explain(
 
 
 def _echo_figure(name: str | None, plugins: Known) -> bool:
-    """Explain a figure, if it is one."""
+    """Explain the figure of this name; False if there is none."""
     from podusv_cli.figures.drawing import figures_with  # slow, and hardly anybody asks for one
 
     sheet = figures_with(plugins).get(name or "")

@@ -12,9 +12,9 @@ SHORT = 5  # parts of a head that stay in one line
 
 
 def grid(head: Sequence[str], rows: Sequence[Sequence[str]], room: int) -> list[str]:
-    """The lines of the table, none longer than `room`; no lines where that is not possible.
+    """The lines of the table, none longer than `room` letters; none where that is not possible.
 
-    Heads may have line breaks, and are broken at underscores.
+    Heads may have line breaks, and are broken at underscores. The first column may be wrapped.
     """
     columns = list(zip(*rows, strict=True))
     stacks = [
@@ -23,6 +23,7 @@ def grid(head: Sequence[str], rows: Sequence[Sequence[str]], room: int) -> list[
     ]
     widths = [max(map(len, (*s, *column))) for s, column in zip(stacks, columns, strict=True)]
     words = [word for cell in (*stacks[0], *columns[0]) for word in cell.split()]
+    # How narrow the first column may become: no word of it is broken.
     least = max(min(widths[0], NARROWEST), *map(len, words))
     besides = {space: sum(len(space) + width for width in widths[1:]) for space in SPACES}
     fitting = [space for space in SPACES if least + besides[space] <= room]
@@ -31,6 +32,7 @@ def grid(head: Sequence[str], rows: Sequence[Sequence[str]], room: int) -> list[
     space = fitting[0]
     widths[0] = min(widths[0], room - besides[space])
     height = max(map(len, stacks))
+    # Heads of fewer lines stand at the bottom.
     lines = [
         list(line) for line in zip(*([""] * (height - len(s)) + s for s in stacks), strict=True)
     ]

@@ -46,7 +46,7 @@ def load_command(name: str) -> Any:
 def _command_of(name: str, function: Callable[..., None], *, takes_anything: bool = False) -> Any:
     """A function of an installed package as a command of click, with podusv's exit codes.
 
-    `takes_anything` is for one that only refuses: it has to get as far as its sentence.
+    `takes_anything` is for one that only refuses: its sentence must come before errors on options.
     """
     app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
     settings = {"ignore_unknown_options": takes_anything, "allow_extra_args": takes_anything}

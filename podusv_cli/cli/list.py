@@ -75,13 +75,18 @@ def list(
 
 
 def parts(plugins: Known) -> Iterator[ListPart]:
-    """All parts, in the order of the list."""
+    """All parts, in the order of the list.
+
+    `plugins` are plug-ins whose kinds, presets, metrics, figures and findings are in it, too.
+    """
+    # Here and not above: the models are slow to import, and most commands do not list them.
     from podusv_cli.metrics.table import metrics_with
     from podusv_cli.scenario.explain import first_sentence, kinds
     from podusv_cli.scenario.model import BASES
     from podusv_cli.scenario.presets import preset_about, preset_names, preset_text, with_presets
 
     by_section = kinds(plugins)
+    # LAWS first, then the sections in the model's order.
     for section in dict.fromkeys((LAWS, *by_section)):
         summaries = by_section[section]
         words = (f"{section}s", f"{BASES[section].noun}s")
@@ -91,6 +96,7 @@ def parts(plugins: Known) -> Iterator[ListPart]:
         texts = [
             (
                 name,
+                # A preset without a comment at its top has at least a source.
                 preset_about(presets, name, plugins)
                 or first_sentence(preset_text(presets, name, "source", plugins)),
                 _size(presets, name, plugins),
@@ -109,7 +115,7 @@ SIZES = {"length": "m", "beam": "m", "m": "kg"}  # what tells vessels apart at o
 
 
 def _size(presets: Presets, name: str, plugins: Known) -> str:
-    """Length, beam and mass of a vessel; nothing of other presets."""
+    """Length, beam and mass of a vessel with units; "" for presets of other sections."""
     from podusv_cli.scenario.presets import preset_text
 
     sizes = {key: preset_text(presets, name, key, plugins) for key in SIZES}

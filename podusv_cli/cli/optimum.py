@@ -90,7 +90,7 @@ def optimum(
 
 
 def _report(done: Optimum) -> None:
-    """Print the stages of the search, and how far podusv's own run of the optimum departs."""
+    """Print the stages of the search, and how far podusv's own run departs from the optimum."""
     name = done.minimised
     unit = done.run.rows[name].unit
     rows = [
@@ -100,6 +100,7 @@ def _report(done: Optimum) -> None:
     echo_table(["from a run of", "step", f"{name} [{unit}]", "iterations", "time"], rows)
     echo(f"a local optimum, to IPOPT's tolerance of {done.tolerance:g}; a search from the run of")
     echo("another law in `controllers` may lead to a lower one")
+    # An interrupted run lacks them.
     if name in done.run.metrics and done.departures:
         away = done.departures
         added = [

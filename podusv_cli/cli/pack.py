@@ -56,7 +56,10 @@ def in_words(size: float) -> str:
 
 
 def show(contents: PackedContents) -> None:
-    """What a packed folder has: its kind, code, packages and versions."""
+    """Print what a packed folder has, and which versions differ here.
+
+    That is kind, code, pages and packages.
+    """
     sizes = contents.sizes
     count = f"{len(sizes)} files, {in_words(sum(sizes.values()))}"
     facts = f"{contents.kind}, {contents.status}: {count}"

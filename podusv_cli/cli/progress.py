@@ -31,14 +31,15 @@ class Bars(Protocol):
     """Bars by name."""
 
     def __call__(self, name: str, fraction: float, patience: float = PATIENCE) -> None:
-        """Draw a bar, so many seconds after the command began or later."""
+        """Draw a bar, but not before the command has run for `patience` [s]."""
 
 
 @contextmanager
 def progress_bars(*, wanted: bool) -> Iterator[Bars | None]:
-    """A function to call with a run's name and the fraction done; a bar a run, on stderr.
+    """A function to call with a run's name and the fraction done; it draws a bar a run on stderr.
 
-    None if stderr is no terminal with colours. If the terminal is lost, the bars stop.
+    None where none is `wanted`, or stderr is no terminal with colours. If the terminal is lost, the
+    bars stop.
     """
     if not (wanted and supports_colours(sys.stderr)):
         yield None
@@ -83,9 +84,10 @@ def _stop(bars: Progress) -> None:
 
 
 def compiling(bars: Bars | None, *, wanted: bool = False) -> Callable[[float], None] | None:
-    """The bar of what is compiled once, for all runs to come; it appears at once.
+    """A function that shows how much of the code is compiled, once for all runs to come.
 
-    In a pipe, where it is `wanted`, a line on stderr after a while.
+    A bar at once, where there are `bars`. In a pipe, where it is `wanted`, a line on stderr after a
+    while.
     """
     if bars:
         return partial(bars, "compiling, once", patience=0.0)
@@ -93,21 +95,24 @@ def compiling(bars: Bars | None, *, wanted: bool = False) -> Callable[[float], N
 
 
 def _say_once_after(seconds: float, text: str) -> Callable[[float], None]:
-    """A function to call with the fraction done; prints a line where that takes over `seconds`."""
+    """A function to call with the fraction done, from 0 to 1.
+
+    It prints `text` once if the work is not done `seconds` after the first call.
+    """
     begins: list[float] = []
 
     def tell(fraction: float) -> None:
         """Note that `fraction` of the work is done; print `text` once if it takes long."""
         begins.append(time.monotonic())
         if fraction < 1.0 and begins[-1] - begins[0] > seconds:
-            begins[:] = [math.inf]  # from here on less has passed than nothing
+            begins[:] = [math.inf]  # so that `text` is not printed again
             echo(text, err=True)
 
     return tell
 
 
 class StudyLine:
-    """A line on stderr that tells how far a study is; nothing where stderr is no terminal."""
+    """A line on stderr that shows how far a study is; nothing where stderr is no terminal."""
 
     def __init__(self, *, wanted: bool) -> None:
         """Nothing is shown yet."""
@@ -125,7 +130,7 @@ class StudyLine:
             )
 
     def advance(self, tally: StudyTally, text: str) -> None:
-        """Show runs done, time left, and what is told of them."""
+        """Show runs done, time left, and what is said of them."""
         if time.monotonic() - self._last > PERIOD:
             self._show(f"{tally.made} of {tally.wanted} runs", *_left(tally), text)
 
@@ -143,7 +148,7 @@ class StudyLine:
         self._show(text)
 
     def _show(self, *parts: str) -> None:
-        """The parts that the terminal has room for."""
+        """Show as many of the parts, from the first on, as the terminal has room for."""
         line = parts[0]
         for part in parts[1:]:
             line = f"{line}, {part}" if len(line) + len(part) + 3 < columns() else line

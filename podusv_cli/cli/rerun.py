@@ -71,7 +71,7 @@ def _exit_code(done: Repetition) -> int:
 
 
 def _verdict(run: Repeated) -> str:
-    """Whether a run came out again, in one phrase."""
+    """Whether a run came out the same again, in one phrase: bytes, numbers only, or neither."""
     if run.found.same_bytes:
         return f"identical: {run.found.sizes[0]} bytes, sha256 {run.found.digests[0]}"
     if run.identical:
@@ -80,7 +80,7 @@ def _verdict(run: Repeated) -> str:
 
 
 def _lines(run: Repeated) -> Iterator[str]:
-    """What differs from the run before: signals, scenario, versions."""
+    """Sentences on what differs from the run before: signals, scenario, versions."""
     difference = run.found
     if difference.log:
         yield from log_in_words(difference.log)

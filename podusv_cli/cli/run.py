@@ -78,12 +78,13 @@ def run(
 
 
 def _report(done: Finished, verbose: bool) -> None:
-    """All metrics in a pipe and with `verbose`; on a terminal the headlines."""
+    """Print all metrics in a pipe and with `verbose`; on a terminal the headlines."""
     from podusv_cli.comparison.table import table, window
 
     brief = sys.stdout.isatty() and not verbose
     words, numbers = BRIEF if brief else WHOLE
     rows = {n: m for n, m in done.rows.items() if n in done.metrics and (m.headline or not brief)}
+    # Of a run that did not finish, numbers say little.
     for name, metric in rows.items() if done.status == "finished" else ():
         number = done.metrics[name]
         shown = f"{number:>12.6g} {metric.unit if metric.unit != '1' else ''}"

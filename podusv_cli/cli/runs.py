@@ -57,7 +57,7 @@ def runs(
 
 
 def _row(run: ListedRun, metric: str) -> list[str]:
-    """A table row of a run: start, kind, name, law, status, duration, `metric`, folder."""
+    """A table row of a run, as text: start, kind, name, law, status, duration, `metric`, folder."""
     from podusv_cli.core.quantities import time_in_words
 
     law = run.laws[0] if len(run.laws) == 1 else f"{len(run.laws)} laws"

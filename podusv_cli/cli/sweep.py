@@ -113,7 +113,10 @@ def seconds(text: str) -> float:
 
 
 def part_of(text: str) -> tuple[int, int]:
-    """A shard such as 3/20 as its number from 1, and how many there are. Raises UsageError."""
+    """A shard such as 3/20 as its number from 1, and how many there are; "" is 1/1.
+
+    Raises UsageError.
+    """
     match = re.fullmatch(r"(\d+)/(\d+)", text or "1/1")
     if not match or not 1 <= int(match[1]) <= int(match[2]):
         raise UsageError(f"--shard {text!r} is no part; write its number and the count: 3/20")
@@ -123,7 +126,7 @@ def part_of(text: str) -> tuple[int, int]:
 def _tell(done: Swept, *, as_json: bool, quiet: bool) -> None:
     """Print a study, and on stderr what of it could not be made.
 
-    Exits with 3 for broken runs, and for kept logs that differ from the table.
+    Exits with SOME_FAILED for broken runs, and for kept logs that differ from the table.
     """
     show(done, lambda: _report(done), as_json=as_json, quiet=quiet)
     if done.results and (done.results.broken_runs or done.results.contradicted):
@@ -153,7 +156,7 @@ def _report(done: Swept) -> None:
 
 
 def _next(done: Swept) -> str:
-    """What to do with an unfinished study."""
+    """What to do next with an unfinished study, in words: join its shards, or continue it."""
     if done.part_is_whole:
         return "this shard is done: join all of them with podusv sweep merge"
     from podusv_cli.scenario.plugins import continue_with

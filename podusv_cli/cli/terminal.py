@@ -27,7 +27,7 @@ SPACE = "  "  # between the columns of a table
 def echo(*lines: object, err: bool = False) -> None:
     """Print lines, on stderr with `err`; wrapped on a terminal, whole in a pipe.
 
-    Control characters are escaped.
+    Control characters are escaped, as a terminal would obey them.
     """
     shown = [visible(line) for line in lines]
     if (sys.stderr if err else sys.stdout).isatty():
@@ -49,7 +49,10 @@ def echo_json(content: Mapping[str, Any]) -> None:
 
 
 def echo_result(done: Any, report: Callable[[], None], *, as_json: bool, quiet: bool) -> None:
-    """What a command is asked to print of its result: JSON, its folder's path, or a report."""
+    """Print what a command is asked for: its result as JSON, its folder's path, or a report.
+
+    `done` is the result, with `as_json` and `folder`; `report` prints the report.
+    """
     if as_json:
         echo_json(done.as_json())
     elif quiet:
@@ -74,7 +77,10 @@ class Done(Protocol):
 
 
 def show(done: Done, report: Callable[[], None], *, as_json: bool, quiet: bool) -> None:
-    """Print what was made as it was asked for, and on stderr what of it is missing."""
+    """Print what was made as it was asked for, and on stderr what of it is missing.
+
+    `report` prints it for people.
+    """
     echo_result(done, report, as_json=as_json, quiet=quiet)
     for part in done.missing:
         echo(part.sentence_with_trace, err=True)
@@ -108,10 +114,10 @@ def supports_colours(stream: TextIO) -> bool:
 
 
 def echo_table(head: list[str], rows: list[list[str]]) -> None:
-    """A table in columns, whole in a pipe.
+    """Print a table in columns, whole in a pipe.
 
     Where the terminal is too narrow for it, it is cut into tables below each other, each with the
-    first two columns; where it is too narrow even for one further column, a block for each row.
+    first two columns. Where it is too narrow even for one further column, each row becomes a block.
     """
     head, rows = [*map(visible, head)], [[*map(visible, row)] for row in rows]
     widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
@@ -129,7 +135,10 @@ def echo_table(head: list[str], rows: list[list[str]]) -> None:
 
 
 def _parts(widths: list[int], room: int) -> Iterator[list[int]]:
-    """The columns of each table, as many as there is room for, after the first two."""
+    """The numbers of the columns in each partial table: the first two, and as many as fit.
+
+    `widths` are those of the columns, `room` that of the terminal [letters].
+    """
     part = [0, 1]
     for i in range(2, len(widths)):
         if sum(widths[j] for j in (*part, i)) + len(SPACE) * len(part) > room:
@@ -159,7 +168,10 @@ def _width() -> int:
 
 
 def warn_of_differences(differences: Mapping[str, Mapping[str, Any]]) -> None:
-    """Print on stderr in which keys, besides the controller, compared runs differ."""
+    """Print on stderr in which keys, besides the controller, compared runs differ.
+
+    `differences` has the value of each run, by label, for each key.
+    """
     from podusv_cli.comparison.differences import as_text
 
     if differences:
@@ -199,11 +211,15 @@ class Warnings:
 
 
 def _group_findings(findings: Sequence[Finding], labels: Sequence[str]) -> Iterator[Finding]:
-    """One finding of each kind and key, with all its runs and the sentence of the first."""
+    """One finding of each kind and key, with all its runs and the sentence of the first.
+
+    `labels` are those of all runs.
+    """
     alike: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:
         alike.setdefault((finding.code, finding.where), []).append(finding)
     for first, *others in alike.values():
+        # A finding without runs is about the scenario.
         if not others or not first.runs:
             yield from (first, *others)
             continue

@@ -93,7 +93,10 @@ def _report(done: Verification) -> None:
 
 
 def _show_run(label: str, run: RunVerification, done: Verification) -> None:
-    """Print a run's numbers at each step, their order and error, and where one ended early."""
+    """Print a run's numbers at each step, their order and error, and where one ended early.
+
+    `label` is the run's; `done` has the tolerance and the units of all runs.
+    """
     steps = [f"{level.step:.6g} s" for level in run.levels]
     rows = [
         [name, done.units.get(name, "m"), *_cells(e, done.tolerance)]
@@ -124,10 +127,11 @@ def _show_rankings(rankings: dict[str, Ranking]) -> None:
 
 
 def _in_order(rank: Ranking) -> str:
-    """A ranking in words: labels in order, which are equal, which are too close to tell."""
+    """A ranking of laws in words: labels in order, which are equal, which are too close to rank."""
     if not rank.same:
         return "changes with the step: " + "; ".join(", ".join(o) for o in rank.orders)
     first = rank.orders[0]
+    # Neighbours with equal numbers get an equals sign between them.
     marks = (" = " if pair in rank.equal else ", " for pair in pairwise(first))
     order = first[0] + "".join(mark + label for mark, label in zip(marks, first[1:], strict=True))
     if len(rank.equal) == len(first) - 1:

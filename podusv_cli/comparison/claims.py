@@ -26,7 +26,7 @@ class ParsedClaim:
     given: ast.expr | None = None
 
     def with_labels(self, labels: Mapping[str, str]) -> Self:
-        """The claim with labels in place of its own names for runs."""
+        """The claim with labels in place of its own names for runs; `labels` are by these names."""
         if all(name == label for name, label in labels.items()):
             return self
         expect = with_labels(self.expect, labels)
@@ -52,8 +52,9 @@ class RunsVerdict(Verdict):
         return is_timed(self.claim)
 
     def evidence(self) -> str:
-        """The numbers and the reason, in one line."""
+        """The claim's numbers and the reason of the verdict, in one line."""
         numbers = (
+            # An infinite number is a time that never comes; NaN is a number that is unknown.
             f"{text} = {number:.4g}" if math.isfinite(number) else f"{text}: never"
             for text, number in self.numbers.items()
             if not math.isnan(number)
@@ -78,7 +79,7 @@ def is_timed(claim: Claim) -> bool:
 
 
 def peaks(claims: Sequence[ParsedClaim]) -> dict[str, float]:
-    """Signals of which a claim says how large they become: `max(abs(run.signal)) == number`."""
+    """The sizes that claims say signals become, by signal: `max(abs(run.signal)) == number`."""
     sizes = {}
     for node in (node for parsed in claims for node in ast.walk(parsed.expect)):
         match node:
@@ -99,14 +100,20 @@ def judge(
     runs: Mapping[str, ClaimedRun],
     metrics: Mapping[str, MetricAbout] = METRICS,
 ) -> list[RunsVerdict]:
-    """A verdict on every claim; `runs` by label."""
+    """A verdict on every claim, in the order of `claims`.
+
+    `runs` are by label; `metrics` are those that claims may name.
+    """
     return [_verdict(parsed, runs, metrics) for parsed in claims]
 
 
 def _verdict(
     parsed: ParsedClaim, runs: Mapping[str, ClaimedRun], metrics: Mapping[str, MetricAbout]
 ) -> RunsVerdict:
-    """A claim's verdict: its premise first; an untestable one gets no answer, only numbers."""
+    """A claim's verdict: its premise first; an untestable one gets no answer, only numbers.
+
+    `runs` are by label.
+    """
     evaluation = Evaluation(runs, parsed.claim.tolerance, metrics)
     if parsed.given and (given := evaluation.holds(parsed.given)) is not True:
         doubts = "; ".join(dict.fromkeys(evaluation.doubts))

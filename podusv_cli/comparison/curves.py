@@ -66,7 +66,10 @@ Quantity = float | Curve
 
 
 def metric(label: str, run: ClaimedRun, about: MetricAbout) -> float:
-    """A metric of a run, infinite where its event never happened. Raises CannotTell."""
+    """A metric of a run, infinite where its event never happened; `label` names the run.
+
+    Raises CannotTell.
+    """
     name, number = about.name, run.metric(about.name)
     if np.isnan(number):
         if about.happens and not run.ending:
@@ -77,7 +80,10 @@ def metric(label: str, run: ClaimedRun, about: MetricAbout) -> float:
 
 
 def signal(label: str, run: ClaimedRun, name: str) -> Curve:
-    """A signal of a run. Raises CannotTell."""
+    """A signal of a run as a curve, over the times that it was logged at.
+
+    `label` is the run's in claims. Raises CannotTell where the run has no such signal.
+    """
     values = run.signal(name) if run.has(name) else np.empty(0)
     if not len(values):
         raise CannotTell(f"{label}.{name}: {label} {run.ending or 'does not log it'}")
@@ -86,7 +92,10 @@ def signal(label: str, run: ClaimedRun, name: str) -> Curve:
 
 @np.errstate(all="ignore")
 def pointwise(operation: Callable[..., Any], parts: Sequence[Quantity]) -> Quantity:
-    """An operation on numbers and curves, at the times that all curves cover."""
+    """An operation on numbers and curves, at the times that all curves cover.
+
+    A number if all `parts` are numbers, else a curve.
+    """
     curves = [part for part in parts if isinstance(part, Curve)]
     times = common_times(curves)
     plain = [part.at(times) if isinstance(part, Curve) else np.float64(part) for part in parts]
@@ -105,7 +114,10 @@ def common_times(curves: Sequence[Curve]) -> Vector:
 
 @np.errstate(all="ignore")
 def rate(curve: Curve) -> Curve:
-    """The derivative: central differences, one-sided at the ends. Raises CannotTell."""
+    """The derivative of a curve by time: central differences, one-sided at the ends.
+
+    Raises CannotTell where not every step is logged.
+    """
     for label, run in curve.runs.items():
         if run.every > 1:
             raise _refuse_thinned_log("rate", label, run)
@@ -155,8 +167,12 @@ def rms_above(t: Vector, y: Vector, omega: float) -> float:
 
 @np.errstate(all="ignore")
 def decay(t: Vector, y: Vector) -> float:
-    """Rate [1/s] at which |y| falls: the slope of the straight line through ln |y|."""
+    """Rate [1/s] at which |y| falls: the slope of the straight line through ln |y|.
+
+    `t` [s] and `y` are (n,). NaN where y is 0 somewhere.
+    """
     return (
+        # Centred times, so that the fit is well conditioned.
         -float(np.polyfit(t - t.mean(), np.log(abs(y)), 1)[0]) if len(t) > 1 and y.all() else np.nan
     )
 

@@ -50,7 +50,7 @@ def as_text(differing: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, s
 
 
 def _each(tree: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Keys and values of a scenario, with those of the entries of lists."""
+    """Dotted keys and values of a scenario; entries of lists of mappings one by one, `a[0].b`."""
     for key, value in flat(tree):
         if (
             isinstance(value, (list, tuple))
@@ -72,7 +72,8 @@ def _follows_from_kind(
 ) -> bool:
     """Whether the key has one value, and is missing only in runs of another kind.
 
-    Then the kind may also come from a plug-in that the others do not need.
+    Such keys say no more than the kind does. A plug-in, too, follows from the kind of a law that
+    only some runs have. `values` are by label, `differing` are all differing keys.
     """
     above = (key[:at] for at, letter in enumerate(key) if letter == ".")
     known = {repr(value) for value in values.values() if value is not None}

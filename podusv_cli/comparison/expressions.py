@@ -54,7 +54,8 @@ def parse(
 ) -> ast.expr:
     """The syntax tree of an expression about these runs; `signals` are those that a run may log.
 
-    It is checked by evaluating it for runs that have all of these. Raises ExpressionError.
+    It is checked by evaluating it for example runs that have all signals and `metrics`. Raises
+    ExpressionError.
     """
     tree = syntax_tree(text, EXAMPLE)
     example = _ExampleRun(signals, metrics)
@@ -119,7 +120,10 @@ class Evaluation(Walk):
     def link(
         self, sign: ast.cmpop, left: ast.expr, a: float, right: ast.expr, b: float
     ) -> Condition:
-        """Whether one number compares so with the next; unknown where they are too close."""
+        """Whether one number compares so with the next; unknown where they are too close.
+
+        `left` and `right` are the nodes of the numbers, for a sentence on why it is unknown.
+        """
         never = a == b == math.inf
         if math.isnan(a) or math.isnan(b):
             return Condition.of([None])
@@ -131,18 +135,22 @@ class Evaluation(Walk):
         return Condition.known_everywhere(self.signs[type(sign)](a, b, self.tolerance))
 
     def _close(self, a: float, b: float) -> bool:
-        """Whether neither is smaller by more than a margin that there is."""
+        """Whether the tolerance covers the difference of a and b, and allows for any at all."""
         apart = below(a, b, self.tolerance) or below(b, a, self.tolerance)
         return not apart and around(max(abs(a), abs(b)), self.tolerance) > 0.0
 
     def side(self, node: ast.expr) -> float:
-        """A number, kept as evidence; NaN where it is unknown."""
+        """The number of one side, kept as evidence; NaN where it is unknown.
+
+        Raises ExpressionError for a signal over time.
+        """
         doubts, text = len(self.doubts), ast.unparse(node)
         number: Quantity = self.value(node)
         if isinstance(number, Curve):
             refuse(
                 node, f"a signal over time; reduce it to a number with one of {', '.join(REDUCERS)}"
             )
+        # Infinity is a number only where an event never happens.
         if not (math.isfinite(number) or self._never(node)):
             if len(self.doubts) == doubts:
                 self.doubts.append(f"{text} is not a finite number")
@@ -152,7 +160,10 @@ class Evaluation(Walk):
         return number
 
     def _never(self, node: ast.expr) -> bool:
-        """Whether this is the time, or a multiple, of an event that never happens, or a margin."""
+        """Whether the value is the infinite time (or a multiple) of an event that never happens.
+
+        Or an infinite margin, which has no limit.
+        """
         match node:
             case ast.BinOp(left=ast.Constant(), right=part, op=ast.Mult()):
                 return self._never(part)
@@ -165,7 +176,10 @@ class Evaluation(Walk):
         return False
 
     def property(self, node: ast.expr) -> Condition:
-        """A check of a run."""
+        """The answer of a check of a run, such as `finished(pid)`.
+
+        Also kept as evidence (1 or 0).
+        """
         if not isinstance(node, ast.Call):
             refuse(node, f"not a condition; compare numbers, or use one of {', '.join(CHECKS)}")
         name = known_name(function(node), CHECKS, "check")
@@ -184,7 +198,10 @@ class Evaluation(Walk):
         return curves.pointwise(operation, parts)
 
     def quantity(self, node: ast.expr) -> Quantity:
-        """A number, NaN where it is unknown, or a curve. Raises CannotTell for an unknown curve."""
+        """What `run.name` stands for: a metric, NaN where unknown, or a signal over time.
+
+        Raises CannotTell for a signal that is not there, ExpressionError for what has no meaning.
+        """
         match node:
             case ast.Attribute(value=ast.Name(id=label), attr=name):
                 run = self._run(label)
@@ -216,7 +233,10 @@ class Evaluation(Walk):
         return curve
 
     def _reduce(self, name: str, node: ast.Call) -> float:
-        """A number from a signal, over all times or between two [s]. Raises ExpressionError."""
+        """A number from a signal, over all times or between two [s]; NaN and a doubt where unknown.
+
+        Raises ExpressionError.
+        """
         wanted = " and ".join(["a signal", *filter(None, [SETTINGS.get(name)])])
         count = 1 + (name in SETTINGS)
         if len(node.args) not in (count, count + 2):
@@ -230,7 +250,7 @@ class Evaluation(Walk):
         return curves.reduce_curve(name, ast.unparse(node), curve, settings, window)
 
     def _or_doubt(self, number: Callable[[], float]) -> float:
-        """The number, or NaN and a doubt."""
+        """The number, or NaN where it cannot be known, with the reason among the doubts."""
         try:
             return number()
         except CannotTell as doubt:
@@ -242,7 +262,7 @@ class Evaluation(Walk):
 
 
 def with_labels(tree: ast.expr, labels: Mapping[str, str]) -> ast.expr:
-    """The expression with labels in place of its own names for runs."""
+    """A copy of the expression with labels in place of its own names for runs, by these names."""
     tree = deepcopy(tree)
     for node in ast.walk(tree):
         # of `run.metric` and `check(run)`; a function may have the name of a run

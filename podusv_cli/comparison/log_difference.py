@@ -32,9 +32,10 @@ def _bits(array: Vector) -> npt.NDArray[np.int64]:
 
 
 def distances(one: Vector, other: Vector, *, period: float = math.inf) -> Vector:
-    """|one - other|, or the shorter way round a `period`; infinite where one is not finite.
+    """|one - other| for signals (n,), in the shape of both.
 
-    0 where both are the same to the last bit.
+    Signals with a `period`, such as headings with 2 pi, have the shorter way round. A distance is 0
+    where both are the same to the last bit, and infinite where one is not finite.
     """
     unequal = differing(one, other)
     with np.errstate(all="ignore"):
@@ -92,7 +93,11 @@ def _ratio(gap: float, whole: float) -> float:
 
 
 def _rank(number: float) -> int:
-    """Position among all floating-point numbers in order; both zeros are at 0."""
+    """Position among all floating-point numbers in order; both zeros are at 0.
+
+    The bits of a positive number, read as an integer, grow with it; a negative one has its sign bit
+    removed.
+    """
     (bits,) = struct.unpack("<q", struct.pack("<d", number))
     return int(bits) if bits >= 0 else -(bits & 0x7FFF_FFFF_FFFF_FFFF)
 
@@ -125,7 +130,7 @@ class LogDifference:
         return not any(parts) and len(set(self.rows)) == 1
 
     def as_json(self) -> dict[str, Any]:
-        """The difference as plain data."""
+        """The difference as plain data, for --json and for files."""
         return {
             "same": self.same,
             "rows": list(self.rows),
@@ -175,6 +180,7 @@ def compare(one: Recording, other: Recording) -> LogDifference:
     unequal = [pair for pair in alike if differing(pair.one, pair.other).any()]
     names, others = ((*log.signals, *log.fixed) for log in (one, other))
     endings = {name: (getattr(one, name), getattr(other, name)) for name in ENDINGS}
+    # The first pair is time.
     shared = len(pairs[0].one)
     return LogDifference(
         first=_first(unequal),
@@ -206,10 +212,10 @@ def _pair_signals(one: Recording, other: Recording) -> Iterator[_Pair]:
 
 
 def _shared_times(one: Vector, other: Vector) -> tuple[Vector, Any, Any]:
-    """The common times (n,) [s], and their rows in each recording.
+    """The common times (n,) [s] of two logs, and their rows in each recording.
 
-    Where logs of one length differ in less than half of their times, these are damaged values on
-    one grid, and the logs are compared row by row.
+    Where logs of one length differ in half of their times or fewer, these are damaged values on one
+    grid, and the logs are compared row by row.
     """
     if len(one) == len(other) and 2 * np.count_nonzero(differing(one, other)) <= len(one):
         return one, slice(None), slice(None)
@@ -222,13 +228,14 @@ def _first(unequal: list[_Pair]) -> Deviation | None:
     places = [(pair, _place_of_maximum(differing(pair.one, pair.other))) for pair in unequal]
     if not places:
         return None
+    # What is constant in time differs from the start: before all rows.
     pair, place = min(places, key=lambda item: -1 if item[0].times is None else item[1][0])
     return _deviation(pair, place)
 
 
 def _place_of_largest(pair: _Pair) -> Place:
-    # Zeros of different sign differ at a distance of 0.
     """The indices at which two arrays differ most."""
+    # Zeros of different sign differ, at a distance of 0; equal numbers must lie below that.
     distance = distances(pair.one, pair.other, period=pair.period)
     return _place_of_maximum(np.where(differing(pair.one, pair.other), distance, -1.0))
 
@@ -238,7 +245,7 @@ def _place_of_maximum(array: Any) -> Place:
 
 
 def _deviation(pair: _Pair, place: Place) -> Deviation:
-    """The deviation of two arrays at one place, with the peak of both for comparison."""
+    """The deviation of two arrays at one place, with the largest finite size of both."""
     inner = place if pair.times is None else place[1:]
     index = f"[{','.join(map(str, inner))}]" if inner else ""
     both = np.abs(np.concatenate([pair.one.ravel(), pair.other.ravel()]))

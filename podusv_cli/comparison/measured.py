@@ -56,16 +56,19 @@ class Track:
         return (self.times >= begin) & (self.times <= end)
 
     def start_clock_at(self, begin: float) -> Track:
-        """It; where it is to begin as the runs do, with its first position at this time [s]."""
+        """The track, its clock moved so that it begins at `begin` [s].
+
+        A track that is not aligned by START stays as it is.
+        """
         if self.aligned != START:
             return self
         shifted = begin - float(self.times[0])
         return replace(self, times=self.times - self.times[0] + begin, shifted=shifted)
 
     def place_beside(self, label: str, run: Recording) -> Track:
-        """It; where that is asked for, with its first position at a time of the run the run's.
+        """The track, moved so that its first common position is the run's at that time, if aligned.
 
-        A remark says what was moved, and by how much.
+        A remark says what was moved, and by how much. `label` names the run.
         """
         rows = np.flatnonzero(self.common(run["time"][0], run["time"][-1]))
         if not self.aligned or not len(rows):
@@ -87,9 +90,10 @@ class Track:
         return replace(self, signals=signals, remarks=(*self.remarks, self.remark(text)))
 
     def about(self, run: RunAbout, counts_to: float = math.inf) -> RunAbout:
-        """What it says about itself beside a run: the same task, as long as it lasts, no law.
+        """What the track says about itself beside a run.
 
-        `counts_to` [s] is when the last of the runs beside it has done its path.
+        It has the run's task, its own duration, and no law. `counts_to` [s] is when the last of the
+        runs beside it has done its path.
         """
         said = {**run.said, "controller": NO_LAW}
         return run.model_copy(
@@ -107,7 +111,10 @@ class Track:
         )
 
     def beside(self, run: Recording, label: str, about: RunAbout) -> PastRun:
-        """It as a run, with the target of another one; `about` as the method has it."""
+        """The track as a run, with the target of `run` at the track's own times.
+
+        `about` is what the track says about itself.
+        """
         signals = {"time": self.times, **self.signals}
         for name in TARGET:
             signals[name] = np.interp(self.times, run["time"], run[name])
@@ -118,9 +125,10 @@ class Track:
         return PastRun(label, about, log, folder=self.file)
 
     def departures(self, run: Recording) -> dict[str, float]:
-        """How far a run is from it where times agree, by metric; over FEWEST instants at least.
+        """How far a run is from the track where times agree, by metric.
 
-        Headings count where the track has one; they are NaN where it has fewer than FEWEST.
+        Metrics need FEWEST such instants at least. Headings count where the track has one; they are
+        NaN where it has fewer than FEWEST.
         """
         times = run["time"]
         rows = self.common(times[0], times[-1]) if len(times) else np.zeros(len(self.times), bool)
@@ -132,6 +140,7 @@ class Track:
             np.interp(self.times[rows], times, run[name]) - self.signals.get(name, nothing)[rows]
             for name in POSE
         )
+        # The heading error is taken to -pi to pi.
         distances, turned = np.hypot(x, y), np.remainder(psi + math.pi, 2.0 * math.pi) - math.pi
         turned = turned[np.isfinite(turned)]
         enough = len(turned) >= FEWEST
@@ -147,7 +156,8 @@ class Track:
         return [*self._beside_speeds(label, run), *self._beside_place(label, run)]
 
     def _beside_place(self, label: str, run: Recording) -> list[Finding]:
-        """A remark where both extend little beside the distance between them."""
+        """A remark where the distance between both is large beside what either extends over."""
+        # An aligned track was moved on purpose.
         if self.aligned or not len(run["time"]):
             return []
         own, other = (
@@ -166,7 +176,10 @@ class Track:
         return [self.remark(text)]
 
     def _beside_speeds(self, label: str, run: Recording) -> list[Finding]:
-        """A remark where it is much faster or slower than a run, as in other units."""
+        """A remark where the track is SCALED times faster or slower than a run.
+
+        Then it may have other units. Empty otherwise.
+        """
         own, other = _path(self.times, self.signals), _path(run["time"], run.signals)
         if not own or not other or 1.0 / SCALED < own / other < SCALED:
             return []

@@ -16,9 +16,9 @@ TASK = ("vessel", "start", "path", "disturbance", "actuator")
 
 
 def with_optimum_ratios(runs: Sequence[PastRun], extras: Extras) -> list[PastRun]:
-    """The runs, each with its ratio to the optimum among them that has the same task.
+    """The runs, each with its ratio to the best optimum among them that has the same task.
 
-    A run of another task has no ratio; `extras` says what differs.
+    A run of another task has no ratio; `extras` notes what differs.
     """
     related_runs = list(runs)
     for metric, ratio in OF_OPTIMUM.items():

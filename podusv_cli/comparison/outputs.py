@@ -78,7 +78,7 @@ def write(writer: RunWriter, result: Result, extras: Extras) -> None:
 
 
 def _forms(result: Result) -> dict[str, Callable[[], bytes]]:
-    """What makes each file, by its name.
+    """A function for each file that makes its content, by the file's name.
 
     Clock readings have a file of their own, so that all others come out the same every time.
     """
@@ -128,7 +128,8 @@ def draw_comparison(
 ) -> dict[str, bytes]:
     """The figures of all runs together by file name: as asked, and as PNGs for the report.
 
-    `names` as `chosen` has them. `workers` processes draw at a time (0: one a core).
+    `names` are those of figures, as `choose_sheets` takes them. `progress` is called with a text
+    and the fraction done. `workers` processes draw at a time (0: one a core).
     """
     # matplotlib is slow to import
     from podusv_cli.figures.drawing import PHONE, choose_sheets, draw_in_parallel
@@ -148,7 +149,10 @@ def as_report(
     provenance: Mapping[str, Any],
     missing: Iterable[object] = (),
 ) -> str:
-    """The HTML report; `figures` as `drawn` gives them."""
+    """The HTML report; `figures` are the files of `draw_comparison`, `missing` what failed.
+
+    `title` is its heading, `provenance` that of the comparison.
+    """
     pictures: list[Picture] = []
     if figures:
         from podusv_cli.figures.drawing import PHONE, figures_of  # matplotlib is slow to import

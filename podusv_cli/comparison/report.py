@@ -52,7 +52,7 @@ class Story:
 
 
 def page(story: Story) -> str:
-    """The whole report."""
+    """The whole report as HTML."""
     from markupsafe import Markup  # with jinja2
 
     figures, parts = [*enumerate(story.figures, 1)], _parts(story)
@@ -105,7 +105,7 @@ class Standing(NamedTuple):
 
 
 def _standings(story: Story, rows: Sequence[MetricRow]) -> dict[str, Standing]:
-    """Every run that finished, by label; the rows are those that a reader sees first."""
+    """What the answer says of every run that finished, by label; `rows` come first in the table."""
     best = leaders(story.table, story.metrics, story.unsettled)
     standings = {}
     for label in itertools.compress(story.table.columns, story.table.finished):
@@ -138,16 +138,24 @@ def _by_code(story: Story) -> dict[str, tuple[str, list[Finding]]]:
 def laws(
     tables: Sequence[Sequence[SettingAbout]],
 ) -> list[tuple[SettingAbout, list[SettingAbout | None]]]:
-    """Every key that a law sets otherwise than by default: what it is, and what each law has."""
+    """Every key that any law sets otherwise than by default: what it is, and what each law has.
+
+    `tables` are the settings of each law; None where a law lacks the key.
+    """
     keyed = [{setting.key: setting for setting in table} for table in tables]
+    # Reversed, so that the first law that has a key describes it.
     about = {key: setting for table in reversed(keyed) for key, setting in table.items()}
     keys = dict.fromkeys(setting.key for table in tables for setting in table if setting.changed)
+    # The kind comes first.
     ordered = sorted(keys, key=lambda key: key != "kind")
     return [(about[key], [table.get(key) for table in keyed]) for key in ordered]
 
 
 def _parts(story: Story) -> list[tuple[str, str, str]]:
-    """A row for each part: its name, the first line of what it says of itself, all its values."""
+    """Rows for each part: its name, the first line of what it says of itself, all its values.
+
+    Parts besides the laws are those of the first run.
+    """
     (first, *_), law = story.abouts.values(), "controller"
     parts = {name: (said, name, first) for name, said in first.said.items() if name != law}
     parts |= {

@@ -19,7 +19,7 @@ from podusv_cli.storage.run_folder import LOG, RunFolder
 
 Change = tuple[Any, Any]
 Numbers = tuple[float | None, float | None]
-# Keys of provenance.json that are different for every run, or told by the scenario
+# Keys of provenance.json that are different for every run, or given by the scenario
 OF_EACH_RUN = ("argv", "started", "finished", "duration_s", "plugins")
 
 
@@ -82,12 +82,13 @@ def relative(one: float | None, other: float | None) -> float | None:
 
 
 def difference(one: RunFolder, other: RunFolder) -> RunDifference:
-    """Compare two opened run folders. Raises StorageError.
+    """Compare two opened run folders: log, scenario, versions and metrics. Raises StorageError.
 
     A log that is missing, as it was not packed, is compared by its digest.
     """
     entries = [manifest.read(run.path).files[LOG] for run in (one, other)]
     whole = one.has_log and other.has_log
+    # A log has the scenario that made it, also where the file beside it was changed.
     texts = [
         log_reader.resolved_yaml(run.path / LOG) if whole else run.resolved_yaml
         for run in (one, other)

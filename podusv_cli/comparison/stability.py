@@ -28,7 +28,7 @@ def check(theory: Mapping[str, Any], path: Path) -> None:
 
 
 def rows(theories: Mapping[str, Mapping[str, Any]]) -> Iterator[list[str]]:
-    """A row for each run and window; `theories` are the contents of theory.json by label."""
+    """A row of texts for each run and window, under HEAD; `theories` are theory.json by label."""
     for label, theory in theories.items():
         failing = "; ".join(_failing(theory)) or "none"
         for part, window in theory["windows"].items():
@@ -43,7 +43,10 @@ def rows(theories: Mapping[str, Mapping[str, Any]]) -> Iterator[list[str]]:
 
 
 def _failing(theory: Mapping[str, Any]) -> Iterator[str]:
-    """The conditions and assumptions of a theory.json that do not hold, in words."""
+    """The conditions and assumptions that do not hold, in words.
+
+    `theory` is the content of a run's theory.json.
+    """
     for condition in theory["conditions"]:
         if not condition["holds"]:
             value, limit = _number(condition["value"], "g"), _number(condition["limit"])

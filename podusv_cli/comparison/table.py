@@ -116,7 +116,7 @@ def numbers(frame: MetricTable) -> dict[str, dict[str, float | None]]:
 
 
 def as_csv(frame: MetricTable, known: Mapping[str, MetricAbout] = METRICS) -> str:
-    """The table as CSV, in full precision, with ratios last."""
+    """The table as CSV, in full precision, with ratios to the first run last."""
     first = frame.columns[0]
     heads = [METRIC, "unit", *frame.columns, *(f"{column}/{first}" for column in frame.columns[1:])]
     lines = (
@@ -171,7 +171,7 @@ def rows(
 
     None chosen: all, those that a reader sees first before the others. `unsettled` are the runs
     that do not end at their target; they are never the best, and neither is a run by itself.
-    `brief` numbers have FEW digits.
+    `brief` numbers have FEW digits. `ratios` says whether those to the first run are added.
     """
     of_metrics = dict[str, MetricRow]()
     unranked, finished = _metrics_without_best(frame, known), frame.finished
@@ -205,7 +205,10 @@ def cells(
     *,
     chosen: Sequence[str] = (),
 ) -> list[list[str]]:
-    """The `rows` as text: what the metric is, unit, a text a run, and the metric's name."""
+    """The `rows` as text: what the metric is, unit, a text a run, and the metric's name.
+
+    The arguments are those of `rows`.
+    """
     return [
         [metric.row, metric.unit, *texts, metric.name]
         for metric, texts in rows(frame, known, unsettled, chosen=chosen)
@@ -220,10 +223,10 @@ def head(frame: MetricTable) -> list[str]:
 def _metrics_without_best(
     frame: MetricTable, known: Mapping[str, MetricAbout] = METRICS
 ) -> list[str]:
-    """Metrics in which no run is marked best.
+    """Metrics in which no run is marked best; `known` describes the metrics by name.
 
     Measured times vary. Where a law keeps a standoff, being nearer to the target is not better.
-    Smaller margins are worse.
+    Larger margins are better, and the least number is marked.
     """
     both = zip(frame.rows.get("iae", ()), frame.rows.get("iae_e", ()), strict=False)
     standoff = any(iae > beyond for iae, beyond in both)
@@ -237,9 +240,10 @@ def _metrics_without_best(
 def leaders(
     frame: MetricTable, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = ()
 ) -> dict[str, list[str]]:
-    """The metrics in which each run is best; equal numbers and measured times rank nobody.
+    """The metrics in which each run is best, by label.
 
-    Neither do `unsettled` runs, which do not end at their target.
+    Equal numbers and measured times make no run the best. Numbers are compared as printed.
+    `unsettled` runs, which do not end at their target, are left out.
     """
     unranked = _metrics_without_best(frame, known)
     best: dict[str, list[str]] = {column: [] for column in frame.columns if column not in unsettled}
@@ -262,7 +266,10 @@ def _format_number(number: float, digits: int = DIGITS) -> str:
 
 
 def _cell(number: float, first: float, best: float, digits: int) -> str:
-    """A number with `*` where it shows like the best one, and its ratio to the first run's."""
+    """A number with `*` where it prints like the `best` one, and its ratio to the `first` run's.
+
+    NaN for `best` or `first` gives no mark or no ratio.
+    """
     if math.isnan(number):
         return "-"
     shown = _format_number(number, digits)
@@ -279,7 +286,8 @@ def as_markdown(
     *,
     chosen: Sequence[str] = (),
 ) -> str:
-    """The table in Markdown, followed by the reasons why runs did not finish."""
+    """The table in Markdown, followed by the reasons why runs did not finish (`endings`)."""
+    # The last line of a traceback says what is wrong.
     last = {label: ending.strip().splitlines()[-1:] for label, ending in endings.items()}
     failures = [
         f"- {escaping.markdown(label)}: {escaping.markdown(line)}"
@@ -335,7 +343,10 @@ def as_latex(
 
 
 def _of_a_power(row: MetricRow) -> Scaled:
-    """A row of large or small numbers as multiples of a power of ten, which its unit then has."""
+    """A row of large or small numbers as multiples of a power of ten, which its unit then has.
+
+    Rows that print in FEW digits anyway, or that span too many powers, stay as they are.
+    """
     numbers = [float(match[0]) for text in row.texts if (match := NUMBER.match(text))]
     powers = [math.floor(math.log10(abs(number))) for number in numbers if number]
     power = min(powers, default=0)
@@ -349,7 +360,10 @@ def _of_a_power(row: MetricRow) -> Scaled:
 
 
 def _least_width(heads: Sequence[Sequence[str]], shown: Sequence[Scaled]) -> float:
-    """About what the columns take with words that are broken [em]."""
+    """About the width [em] that the columns take where words are broken.
+
+    `heads` are the lines of each label, `shown` the rows.
+    """
     lengths = max((len(own.metric.unit) + POWER * bool(own.power) for own in shown), default=0)
     for place, head in enumerate(heads):
         sides = zip(*(_lengths(own.texts[place]) for own in shown), strict=True)
@@ -376,7 +390,10 @@ def _stack_lines(lines: Sequence[str]) -> str:
 
 
 def _cut(text: str) -> list[str]:
-    """A number up to its decimal point, and the rest with the ratio."""
+    """A number up to its decimal point, and the rest with the ratio.
+
+    Both are bold where the number is marked best.
+    """
     number, _, ratio = text.partition(" (")
     whole, point, power = _parts(number.removesuffix("*"))
     cut = [whole, point + power]

@@ -88,20 +88,24 @@ class TriedChoice:
         return any(not t.judged.failed and not t.judged.same(claim, base) for t in self.trials)
 
     def turns(self, claim: str, base: Judged) -> list[Turn]:
-        """Where a claim's verdict turns: for words each that does, for numbers on each side."""
+        """Where a claim's verdict turns: at words, or at the nearest number on each side.
+
+        Each word that turns it is listed.
+        """
         turned = [t for t in self.trials if t.judged.contradicts(claim, base)]
         if not self.choice.range:
             return [Turn(self.choice, t.value, self.choice.own, 0.0) for t in turned]
         sides = ([t for t in turned if (t.value > self.choice.own) == up] for up in (True, False))
+        # Numbers at which the answer is the scenario's own.
         holding = [
             t.value for t in self.trials if t.judged.answers.get(claim) is base.answers[claim]
         ]
         return [self._nearest(side, holding) for side in sides if side]
 
     def _nearest(self, turned: Sequence[TriedValue], holding: Sequence[float]) -> Turn:
-        """Where the answer turns nearest to the scenario's own value.
+        """The turn nearest to the scenario's own value, among `turned` trials of one side.
 
-        `turned` are trials with another answer, `holding` values with the same one.
+        `holding` are values with the same answer; the farthest of them before the turn bounds it.
         """
         own = self.choice.own
         first = min(turned, key=lambda t: abs(t.value - own))
@@ -117,12 +121,16 @@ class TriedChoice:
 def explore_choice(
     choice: Choice, judge: Judge, base: Judged, numbers: Mapping[str, Sequence[ClaimNumber]]
 ) -> TriedChoice:
-    """Try the values of a choice, and find where verdicts turn; `numbers` are those of a claim."""
+    """Try the values of a choice, and find where verdicts turn.
+
+    `base` is the world as it is; `numbers` are those that each claim compares, by its name.
+    """
     if not choice.range:
         return TriedChoice(
             choice, tuple(TriedValue(v, judge(world_with(choice, v))) for v in choice.values)
         )
     sides = [_Side(choice, end, judge, base) for end in ends(choice)]
+    # Most numbers act on no claim, which two looks a side show.
     acting = any(
         _acts(side.judge_at(share * side.whole), claim, base)
         for side in sides
@@ -147,7 +155,7 @@ def _acts(judged: Judged, claim: str, base: Judged) -> bool:
 
 
 def ends(choice: Choice) -> list[float]:
-    """The two ends of the range, without the choice's own value."""
+    """The two ends of the range, one where the other is the choice's own value."""
     assert choice.range
     way, own = choice.range.alone, choice.own
     drawn = way.distribution.at(np.array(EDGES)).tolist()
@@ -167,14 +175,14 @@ class _Side:
         }  # a value and what is said
 
     def judge_at(self, distance: float) -> Judged:
-        """What the claims say where the choice is so far from the scenario's own value."""
+        """What the claims say with the choice at this `distance` from the scenario's own value."""
         if distance not in self.trials:
             value = self.choice.own + math.copysign(distance, self.end - self.choice.own)
             self.trials[distance] = value, self.judge(world_with(self.choice, value))
         return self.trials[distance][1]
 
     def turns_at(self, distance: float, claim: str) -> bool:
-        """Whether a verdict is the opposite where the choice is so far from its own value."""
+        """Whether a verdict is the opposite with the choice at this distance from its own value."""
         return self.judge_at(distance).contradicts(claim, self.base)
 
     def tried_between(self) -> list[float]:
@@ -185,9 +193,10 @@ class _Side:
 
 
 def _look_nearer(side: _Side, places: list[float], claim: str, number: ClaimNumber) -> None:
-    """Look by golden section where a number is nearer to its edge than at the places beside it.
+    """Look by golden section where a number is nearer to its limit than at the places beside it.
 
-    It ends with a turn, or where the number would have to fall more steeply than it may.
+    `places` are distances from the scenario's own value, in order. It ends with a turn, or where
+    the number would have to fall more steeply than it may.
     """
     unknown = side.base.answers[claim] is None  # so that nothing can turn it
     if unknown or any(side.turns_at(distance, claim) for distance in side.trials):
@@ -200,6 +209,7 @@ def _look_nearer(side: _Side, places: list[float], claim: str, number: ClaimNumb
         far = min(abs(number.of(judged.numbers.get(claim, {})) - edge) for edge in edges)
         return far if math.isfinite(far) else math.inf
 
+    # A dip between neighbours may hide a turn that the places miss.
     for a, b, c in zip([0.0, *places], places, places[1:], strict=False):
         if away(a) > away(b) <= away(c) and away(b) < away(0.0):
             _golden(side, claim, away, (a, b, c))
@@ -210,13 +220,15 @@ def _golden(
 ) -> None:
     """Narrow `around` (distances a < b < c) to where the claim's number is nearest its limit.
 
-    By the golden section; it stops where a crossing is found, or would need a steeper number.
+    By the golden section, with `away` for how far the number is from its limit at a distance. It
+    stops where a verdict turns, or where a turn would need a steeper fall.
     """
     a, b, c = around
     for _ in range(LOOKS):
         slopes = (away(a) - away(b)) / (b - a), (away(c) - away(b)) / (c - b)
         if away(b) > STEEPER * max(slopes[0] * (c - b), slopes[1] * (b - a)):
             return
+        # Into the longer of the two parts.
         new = b - GOLDEN * (b - a) if b - a > c - b else b + GOLDEN * (c - b)
         if side.turns_at(new, claim):
             return
@@ -225,12 +237,17 @@ def _golden(
 
 
 def _bisect(side: _Side, claim: str) -> None:
-    """Find where a verdict turns first, to `SHARP`, or that one unit in the last place turns it."""
+    """Find where a verdict turns first, and add the tries to the side.
+
+    It is found to the ratio SHARP. The search ends early if one unit in the last place turns it.
+    """
+    # A number that is 0 has no last place; that of its scale stands for it.
     near, last = NEAR * side.scale, math.ulp(side.choice.own or side.scale)
     pairs = pairwise([last, *sorted(side.trials)])
     held, turned = next((p for p in pairs if side.turns_at(p[1], claim)), (0.0, 0.0))
     if not turned or (turned <= near and side.turns_at(last, claim)):
         return
     while turned / held > SHARP:
+        # By the geometric mean, as distances reach over many decades.
         middle = math.sqrt(turned * held)
         turned, held = (middle, held) if side.turns_at(middle, claim) else (turned, middle)

@@ -47,8 +47,8 @@ class DoubtAnswer:
     unknown: int
     failed: int
     tried: int  # choices that were moved
-    acted: int  # of which so many change a number of the claim
-    silent: int  # of which so many have a value at which nobody can tell
+    acted: int  # how many of them change a number of the claim
+    silent: int  # how many of them have a value that leaves the claim open
     numbers: Mapping[str, float]  # of the claim, by their text
     number: ClaimNumber  # which of its numbers is nearest to its limit
     spread: Spread  # of this number over the draws
@@ -85,12 +85,16 @@ class DoubtAnswer:
 
 
 def _word(answer: DoubtAnswer, turns: Sequence[Turn], turned: int) -> str:
-    """The word for an answer, from the nearest turn to the draws that turn it."""
+    """The word for an answer, "" where there is no verdict: the first that applies, worst first.
+
+    `turns` are of single choices, `turned` counts draws of all at once.
+    """
     if answer.verdict.answer is None:
         return ""
     nearest = min((turn.share for turn in turns), default=math.nan)
     judged = answer.kept + answer.turned > 0 or not answer.failed
     dumb = answer.silent + answer.unknown > 0 or not judged
+    # In the order of WORDS; a comparison with NaN (no turn) is false.
     reached = (nearest <= KNIFE, nearest <= FRAGILE, bool(turns), turned > 0, dumb, True)
     return WORDS[reached.index(True)]
 
@@ -133,6 +137,7 @@ def _answer(verdict: Verdict, tried: Tried) -> DoubtAnswer:
     """All that was found of one claim: single turns, draws together, and what explains them."""
     claim, base, worlds = verdict.name, tried.base, tried.worlds
     labels = labels_of(verdict.claim)
+    # Choices that the claim's laws have, and that it does not compare.
     moved = [
         alone
         for alone in tried.alone
@@ -166,7 +171,11 @@ def _answer(verdict: Verdict, tried: Tried) -> DoubtAnswer:
 def _nearest(
     verdict: Verdict, base: Judged, worlds: Sequence[Judged]
 ) -> tuple[ClaimNumber, Spread]:
-    """The number of a claim that is nearest to its limit, in half-widths of its draws."""
+    """The number of a claim that is nearest to its limit, and its spread over the draws.
+
+    `base` is the scenario as it is, `worlds` are the draws. Distances are compared in half-widths
+    of each number's spread.
+    """
     numbers = compared_numbers(verdict.claim.expect, verdict.claim.tolerance)
     spreads = {n: n.spread(verdict.name, worlds) for n in numbers}
     own = base.numbers[verdict.name]
@@ -191,7 +200,7 @@ def describe_turn(turn: Turn) -> str:
 
 
 def as_json(answer: DoubtAnswer) -> dict[str, Any]:
-    """An answer as plain data."""
+    """An answer as plain data, as the doubt's JSON file has it."""
     return {
         **answer.verdict.as_json(),
         "word": answer.word,

@@ -24,6 +24,7 @@ def _faults_of_printed(scenario: Scenario) -> Faults:
     """Keys in `doubt.printed` that the scenario has not."""
     assert scenario.doubt
     known = set(by_key(with_loads(scenario.singles())))
+    # A section, or a list's entry, may be printed as a whole.
     sections = {key[:end] for key in known for end in range(len(key)) if key[end] in ".["}
     for place, key in enumerate(scenario.doubt.printed):
         if bracketed_key(key) not in known | sections:
@@ -34,7 +35,10 @@ def _faults_of_printed(scenario: Scenario) -> Faults:
 
 
 def _vary(scenario: Scenario) -> Faults:
-    """Keys in `doubt.vary` that cannot be moved."""
+    """Keys in `doubt.vary` that cannot be moved.
+
+    These are unknown keys, and rows where a study draws rows itself.
+    """
     assert scenario.doubt
     known = by_key(with_loads(scenario.singles()))
     for name, quantity in scenario.doubt.vary.items():

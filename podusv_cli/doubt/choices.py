@@ -57,12 +57,17 @@ class Choice:
         return frozenset(label for label, _ in self.places)
 
     def at(self, value: Any) -> dict[Place, Any]:
-        """Every place with what it has for a value of the choice; of rows, a value is a place."""
+        """What every place has for a value of the choice.
+
+        For rows, a value is the number of a row.
+        """
         if not self.rows:
             return dict.fromkeys(self.places, value)
         row = dict(zip(self.rows.lines.names, self.rows.lines.rows[value].tolist(), strict=True))
         keys = {place: f".{dotted_key(place[1])}" for place in self.places}
         return {
+            # The longest column whose name ends the key: `a.m` is not meant by `m` where both are
+            # there.
             place: row[max((name for name in row if key.endswith(f".{name}")), key=len)]
             for place, key in keys.items()
         }
@@ -84,12 +89,14 @@ FIXED = ("kind", "preset", "source", "validity", "length", "beam", "envelope")
 def choices(singles: Singles, doubt: Doubt | None = None) -> list[Choice]:
     """All choices of a comparison but those at keys that the source prints.
 
-    A value that several laws share is one choice; the source prints it if it does for one of them.
+    `singles` are the laws' scenarios by label. A value that several laws share is one choice; the
+    source prints it if it does for one of them.
     """
     doubt = doubt or Doubt()
     groups: dict[tuple[str, str], list[Place]] = defaultdict(list)
     for label, scenario in singles.items():
         for route, own in _leaves(scenario):
+            # By the value's text, as 1 and True are equal.
             groups[dotted_key(route), repr(own)].append((label, route))
     unprinted = [g for g in groups.values() if not any(_is_printed(public(p), doubt) for p in g)]
     of_values = [choice for places in unprinted for choice in _of_places(places, singles)]
@@ -103,7 +110,7 @@ def choices(singles: Singles, doubt: Doubt | None = None) -> list[Choice]:
 
 
 def hulls(singles: Singles, doubt: Doubt) -> Iterator[Choice]:
-    """The choice of a whole hull."""
+    """The choice of a whole hull, by the presets that `doubt.hulls` names; none without any."""
     first = next(iter(singles.values())).vessel.preset
     others = tuple(hull for hull in doubt.hulls if hull != first)
     if others:
@@ -119,7 +126,10 @@ def public(place: Place) -> str:
 
 
 def by_key(singles: Singles) -> dict[str, list[Place]]:
-    """Where each key of the comparison's scenario stands in the runs of its laws."""
+    """Where each key of the comparison's scenario stands in the runs of its laws.
+
+    `singles` are the laws' scenarios by label.
+    """
     known = defaultdict[str, list[Place]](list)
     for label, scenario in singles.items():
         for route, _ in _leaves(scenario):
@@ -158,12 +168,13 @@ def _within(part: Any, at: Route) -> Iterator[tuple[Route, Any]]:
 def _of_places(places: Sequence[Place], singles: Singles) -> Iterator[Choice]:
     """The choice of a value that several laws share, if there is one.
 
-    What laws know of a hull's number follows it where both are the same. That it does not, is the
-    choice of the `nominal` number, and another task.
+    What laws know of a hull's number moves with it where both are the same. Moving the `nominal`
+    number alone is another choice, and another task.
     """
     base, key = _base(places, singles)
     tried = TRIED.get(base.name, lambda own: _values(key, own))(base.own)
     tried = tried or _in_whole_steps(base, singles[places[0][0]], places[0][1])
+    # Ranges depend on the section, then on the unit.
     way = RANGES.get(str(places[0][1][0]), {})
     known = (*places, *_places_laws_know(places, singles))
     if tried:
@@ -177,7 +188,10 @@ def _of_places(places: Sequence[Place], singles: Singles) -> Iterator[Choice]:
 
 
 def _in_whole_steps(base: Choice, scenario: Scenario, route: Route) -> tuple[float, ...]:
-    """Half and twice a time that has to be whole steps, as the period of a sensor; else nothing."""
+    """Half and twice a time that has to be whole steps, as a sensor's period; nothing for others.
+
+    `base` is the choice of that time so far, `route` leads to the time in `scenario`.
+    """
     if base.unit != "s" or not isinstance(base.own, float) or not base.own:
         return ()
 
@@ -187,13 +201,14 @@ def _in_whole_steps(base: Choice, scenario: Scenario, route: Route) -> tuple[flo
             return bool(with_values(scenario, {route: value}))
         return False
 
+    # A time that may be anything gets a range instead.
     if is_taken(base.own * BESIDE):
         return ()
     return tuple(filter(is_taken, (base.own / 2.0, base.own * 2.0)))
 
 
 def _base(places: Sequence[Place], singles: Singles) -> tuple[Choice, Key]:
-    """A choice without other values, and its key."""
+    """A choice at `places` without other values, and what the models say of its key."""
     (label, route), name = places[0], public(places[0])
     key, own = describe_key(singles[label], route), content(singles[label], route)
     task = (name.startswith(TASK) and not name.startswith(WAYS_OF_LAW)) or _adds_load(route, own)
@@ -207,7 +222,7 @@ def _adds_load(route: Route, own: Any) -> bool:
 
 
 def with_loads(singles: Singles) -> Singles:
-    """The same with calm water as a steady load of 0, which may be another."""
+    """The same scenarios with calm water as a steady load of 0, which may then be moved."""
     calm, steady = Calm(), Step()
     return {
         label: single.model_copy(update={"disturbance": steady})
@@ -218,7 +233,7 @@ def with_loads(singles: Singles) -> Singles:
 
 
 def _choice_from_vary(name: str, quantity: Quantity, singles: Singles) -> Choice:
-    """The choice that `doubt.vary` has for a key; see `faults` for what cannot be one."""
+    """The choice that `doubt.vary` has for a key; `doubt_faults` has refused what cannot be one."""
     known = by_key(singles)
     own = [place for key in quantity.targets(name) for place in known[bracketed_key(key)]]
     base, key = _base(own, singles)
@@ -228,12 +243,13 @@ def _choice_from_vary(name: str, quantity: Quantity, singles: Singles) -> Choice
     if quantity.seed or quantity.distribution.choice:
         values = quantity.distribution.choice or _values(key, base.own)
         return replace(base, places=moving, values=values)
+    # Of a number that is 0, a summand's size, or 1 in its unit.
     scale = abs(base.own) or max(abs(quantity.value(base.own, 1.0)), 1.0)
     return replace(base, places=moving, range=DoubtRange(quantity, quantity, scale))
 
 
 def _places_laws_know(places: Sequence[Place], singles: Singles) -> list[Place]:
-    """Where laws know the same of the hull, which moves with it."""
+    """The places where laws know the same numbers of the hull as it has at `places`."""
     hull = [(label, at, ("nominal", *at[1:])) for label, at in places if at[0] == "vessel"]
     return [
         (label, known)
@@ -243,7 +259,10 @@ def _places_laws_know(places: Sequence[Place], singles: Singles) -> list[Place]:
 
 
 def _values(key: Key, own: Any) -> tuple[Any, ...]:
-    """The other words of a word, the next seeds of a seed, half and twice a count."""
+    """The values to try of a word, switch or count: other words, the next seeds, half and twice.
+
+    `own` is the scenario's value. A real number has a range, and thus no values.
+    """
     if isinstance(own, bool):
         return (not own,)
     if isinstance(own, int):
@@ -252,7 +271,10 @@ def _values(key: Key, own: Any) -> tuple[Any, ...]:
 
 
 def _beside(places: Sequence[Place], singles: Singles) -> frozenset[str]:
-    """The laws of the same kind that have another value of a law's own number or word."""
+    """The laws of the same kind that have another value at these places of a law.
+
+    Empty where the places are those of another section.
+    """
     own = {label for label, _ in places}
     if places[0][1][0] != "controller":
         return frozenset()

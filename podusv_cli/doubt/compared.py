@@ -41,9 +41,13 @@ class ClaimNumber(NamedTuple):
             return float(np.divide(left, right)) if self.right else left
 
     def spread(self, claim: str, worlds: Sequence[Judged]) -> Spread:
-        """Its spread over the draws that have it."""
+        """The 5, 50 and 95 % quantiles of the claim's number over `worlds`, the draws.
+
+        Draws without the number are left out; NaN where no draw has it.
+        """
         drawn = np.array([self.of(world.numbers.get(claim, {})) for world in worlds])
         finite = drawn[np.isfinite(drawn)]
+        # Of NaN alone, quantiles are NaN.
         low, middle, high = np.quantile(finite if len(finite) else math.nan, (0.05, 0.5, 0.95))
         return float(low), float(middle), float(high)
 
@@ -54,7 +58,7 @@ class ClaimNumber(NamedTuple):
         return away / (0.5 * (high - low)) if high > low else math.inf
 
     def turning(self, base: Mapping[str, float]) -> tuple[float, ...]:
-        """The edges at which the comparison turns into the opposite of what it is at the base.
+        """The edges at which the comparison turns into the opposite of its answer in `base`.
 
         Those of an equality; of a strict comparison the one beyond which it can tell again.
         """
@@ -63,7 +67,10 @@ class ClaimNumber(NamedTuple):
 
 
 def compared_numbers(expect: str, tolerance: float = 0.0) -> list[ClaimNumber]:
-    """What an expression compares; a condition such as `finished(run)` is 1 or 0."""
+    """The numbers that an expression compares; a condition such as `finished(run)` is 1 or 0.
+
+    `tolerance` is the claim's.
+    """
     tree = ast.parse(expect, mode="eval").body
     links = []
     for node in (node for node in ast.walk(tree) if isinstance(node, ast.Compare)):
@@ -81,7 +88,10 @@ SIDES: dict[type[ast.cmpop], Callable[[float], tuple[float, ...]]] = {
 
 
 def _strictly(tolerance: float) -> tuple[float, ...]:
-    """Of `<` and `>`, which cannot tell within a tolerance of the larger number."""
+    """What the right side is times at both edges of `<` and `>`.
+
+    They cannot tell within a tolerance of the larger number.
+    """
     return (1.0 - tolerance, 1.0 / (1.0 - tolerance)) if tolerance else (1.0,)
 
 

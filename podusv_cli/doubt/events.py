@@ -35,7 +35,7 @@ class Event(NamedTuple):
         return abs(self.time - self.edge)
 
     def __str__(self) -> str:
-        """A sentence."""
+        """The event as a sentence: what a run's signal becomes, and how near a window's edge."""
         side = "before" if self.time < self.edge else "after"
         return (
             f"{self.signal} of {self.run} becomes {self.value:g} at {self.time:g} s, "
@@ -56,11 +56,12 @@ def nearest_event(claim: ParsedClaim, runs: Mapping[str, PastRun]) -> Event | No
 
 
 def _windows(claim: ParsedClaim) -> Iterator[tuple[str, list[float]]]:
-    """The runs in the numbers of a claim that have a window, each with its start and end [s]."""
+    """Each run in a number of the claim that has a window, with the window's start and end [s]."""
     trees = filter(None, (claim.expect, claim.given))
     for node in (node for tree in trees for node in ast.walk(tree)):
         match node:
             case ast.Call(func=ast.Name(id=name), args=[curve, *rest]) if name in REDUCERS:
+                # Some reducers take a number before the window.
                 edges = rest[1:] if name in SETTINGS else rest
                 if len(edges) == 2:
                     for run in {n.id for n in ast.walk(curve) if isinstance(n, ast.Name)}:

@@ -60,13 +60,17 @@ def sketches(report: DoubtReport) -> Iterator[Sketch]:
 def specification(
     report: DoubtReport, answer: DoubtAnswer, acting: Sequence[TriedChoice]
 ) -> Figure:
-    """A claim's number over the draws, sorted, with what was drawn below."""
+    """A claim's number over the draws, sorted, with what was drawn below.
+
+    `acting` are the choices that change the number; LANES of them are shown.
+    """
     tried, name = report.tried, answer.verdict.name
     number = answer.number
     numbers = np.array([number.of(world.numbers.get(name, {})) for world in tried.worlds])
     turned, known = count_turns(name, tried.worlds, tried.base)
     order = [i for i in np.argsort(numbers) if np.isfinite(numbers[i])]
     lanes = _lanes(report, answer, {a.choice.name for a in acting}, numbers[order], order)
+    # The upper panel is 2.2 inches high.
     figure = new_figure(COLUMNS, 2.2 + LANE * len(lanes))
     top, below = figure.subplots(
         2, 1, sharex=True, gridspec_kw={"height_ratios": [2.2, LANE * len(lanes)]}
@@ -79,6 +83,7 @@ def specification(
             continue
         top.plot(at, numbers[[order[x] for x in at]], mark, color=colour, ms=3.0, label=label)
         for lane, column in enumerate(lanes):
+            # A lane is 1 high: shares 0 to 1 of its range fill 0.8 of it, so that lanes stay apart.
             heights = lane + 0.1 + 0.8 * tried.draws.shares[[order[x] for x in at], column]
             below.plot(at, heights, mark, color=colour, ms=1.6)
     own = number.of(answer.numbers)
@@ -101,10 +106,11 @@ def _lanes(
     numbers: Vector,
     order: Sequence[int],
 ) -> list[int]:
-    """The columns of the draws that explain the turns, then those that the number follows.
+    """The columns of the draws to show.
 
-    `numbers` and `order` are (draws,): the claim's number, and the draws from its least to its
-    largest.
+    First those that explain the turns, then those that the number follows. `numbers` and `order`
+    are (draws,): the claim's number, and the draws from its least to its largest. `acting` are
+    names of choices.
     """
     draws = report.tried.draws
     ranks = np.argsort(np.argsort(numbers))
@@ -121,7 +127,10 @@ def _lanes(
 
 
 def ranges(report: DoubtReport, answer: DoubtAnswer, rows: Sequence[TriedChoice]) -> Figure:
-    """The range of each choice, from its own value to both ends, and where the verdict turns."""
+    """The range of each choice, from its own value to both ends, and where the verdict turns.
+
+    Every range is drawn from -1 to 1 with the own value at 0, whatever its numbers.
+    """
     turns = {
         (t.choice.name, t.value > t.choice.own): t for t in (*answer.turns, *answer.neighbours)
     }
@@ -166,9 +175,10 @@ def ranges(report: DoubtReport, answer: DoubtAnswer, rows: Sequence[TriedChoice]
 def turned_spans(
     shown: TriedChoice, end: float, claim: str, base: Judged
 ) -> Iterator[tuple[float, float]]:
-    """First and last of neighbouring tried values that turn a claim, as parts of the way to an end.
+    """First and last of neighbouring tried values that turn a claim, as parts of the way to `end`.
 
-    The parts have the sign of the side; a value alone is both.
+    `end` is one of the range's ends, `base` the claims on the scenario as it is. The parts have the
+    sign of the side; a value alone is both.
     """
     own = shown.choice.own
     side = [t for t in shown.trials if (t.value > own) == (end > own)]

@@ -24,13 +24,14 @@ LENGTH = "m"
 
 
 def study_choices(scenario: Scenario) -> list[Choice]:
-    """What a study does not draw, and its source does not print."""
+    """The choices of a study: what it does not draw, and its source does not print."""
     assert scenario.sweep
     doubt, singles = scenario.doubt or Doubt(), _laws(scenario)
     taken = {key for name, drawn in scenario.sweep.vary.items() for key in drawn.targets(name)}
     taken |= set(scenario.sweep.grid)
     given = set(doubt.vary)
     undrawn = [
+        # Each value costs a study, so of a range only the ends are tried.
         replace(choice, range=None, values=tuple(ends(choice)) if choice.range else choice.values)
         for choice in choices(singles, doubt)
         if (choice.values or choice.name in given) and not _is_taken(choice, taken)
@@ -39,7 +40,7 @@ def study_choices(scenario: Scenario) -> list[Choice]:
 
 
 def _laws(scenario: Scenario) -> Singles:
-    """The scenario of each law that the study has."""
+    """The scenario of each law that the study has, by label: all, or those of `sweep.laws`."""
     assert scenario.sweep
     wanted = scenario.sweep.laws
     return {
@@ -48,7 +49,10 @@ def _laws(scenario: Scenario) -> Singles:
 
 
 def _is_taken(choice: Choice, taken: set[str]) -> bool:
-    """Whether the study draws it, or has cells of it or of a section that it is in."""
+    """Whether the study draws a choice, or has cells of it or of a section that it is in.
+
+    `taken` are the keys that the study draws or has cells of.
+    """
     keys = {public(place) for place in choice.places}
     return any(
         key == drawn or key.startswith((f"{drawn}.", f"{drawn}["))
@@ -58,7 +62,7 @@ def _is_taken(choice: Choice, taken: set[str]) -> bool:
 
 
 def _own(scenario: Scenario, singles: Singles) -> Iterator[Choice]:
-    """The seed of the draws, and the lengths in what counts as a success."""
+    """Choices of the study itself: the seed of its draws, and the lengths in its success."""
     assert scenario.sweep
     everywhere = tuple((label, ("sweep",)) for label in singles)
     seed = scenario.sweep.seed
@@ -69,7 +73,7 @@ def _own(scenario: Scenario, singles: Singles) -> Iterator[Choice]:
 
 
 def _with_lengths(scenario: Scenario, factor: float) -> str:
-    """The condition of success with all its lengths times a factor."""
+    """The condition of success with all its lengths [m] times a factor; itself if it has none."""
     assert scenario.sweep
     known, tree = scenario.known_metrics(), ast.parse(scenario.sweep.success, mode="eval")
     changed = copy.deepcopy(tree)
@@ -77,6 +81,7 @@ def _with_lengths(scenario: Scenario, factor: float) -> str:
         sides = (node.left, *node.comparators)
         lengths = [s for s in sides if isinstance(s, ast.Name) and s.id in known]
         for side in sides:
+            # A number that is compared with a metric in metres is a length.
             if isinstance(side, ast.Constant) and lengths and known[lengths[0].id].unit == LENGTH:
                 side.value = ast.literal_eval(side) * factor
     same = ast.unparse(changed) == ast.unparse(tree)
@@ -84,10 +89,14 @@ def _with_lengths(scenario: Scenario, factor: float) -> str:
 
 
 def overrides(choice: Choice, value: Any, scenario: Scenario) -> list[str]:
-    """What `--set` takes to give a choice another value."""
+    """What `--set` takes to give a choice another value: KEY=VALUE for each of its places.
+
+    `scenario` is that of the study.
+    """
     if choice.name in (SEED, SUCCESS, "vessel.preset"):
         return [f"{choice.name}={json.dumps(value)}"]
     keys = dict.fromkeys(public(place) for place in choice.places)
+    # A scenario with a single law has it under `controller`.
     if not scenario.controllers:
         keys = dict.fromkeys(
             f"controller.{key.split('.', 2)[2]}" if key.startswith("controllers.") else key

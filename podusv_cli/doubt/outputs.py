@@ -44,7 +44,7 @@ class Doubted:
 
 
 def in_words(answer: DoubtAnswer) -> str:
-    """What the verdict hangs on: its word, and how near the nearest place is."""
+    """What the verdict depends on: its word, how near the nearest turn is, and other tasks."""
     nearest = answer.turns[0].share if answer.turns else math.inf
     far = f", {_share(nearest)}" if math.isfinite(nearest) and answer.word == "fragile" else ""
     idle = "" if answer.acted or not answer.word else ": nothing that was moved acts on it"
@@ -58,7 +58,7 @@ def _share(share: float) -> str:
 
 
 def row(answer: DoubtAnswer) -> list[str]:
-    """A claim's row of the table."""
+    """A claim's row of the table: name, verdict, draws that keep it, where it turns, in words."""
     open_ = f", {answer.unknown} cannot tell" if answer.unknown and answer.word else ""
     kept = f"{answer.kept} of {answer.draws}{open_}" if answer.draws else "-"
     others = f" and {len(answer.turns) - 1} more" if len(answer.turns) > 1 else ""
@@ -86,7 +86,7 @@ def write(writer: RunWriter, report: DoubtReport, text: str, *, figures: bool) -
 
 
 def table(answers: Sequence[DoubtAnswer]) -> Iterator[Sequence[Any]]:
-    """A head, and a row a claim."""
+    """Head and rows of the table of claims; cells are empty where no value turns the claim."""
     yield (
         "claim",
         "verdict",
@@ -123,7 +123,7 @@ def table(answers: Sequence[DoubtAnswer]) -> Iterator[Sequence[Any]]:
 
 
 def _turns(report: DoubtReport) -> Iterator[Sequence[Any]]:
-    """Head and rows of turns.csv."""
+    """Head and rows of turns.csv: a row for each value at which a claim's verdict turns."""
     yield "claim", "key", "own", "turns_at", "held", "unit", "distance", "share", "task"
     for answer in report.answers:
         for turn in (*answer.turns, *answer.neighbours):
@@ -165,7 +165,7 @@ def _pictures(report: DoubtReport, extras: Extras) -> list[Picture]:
 
 
 def page(report: DoubtReport, pictures: Sequence[Picture], origin: Mapping[str, Any]) -> str:
-    """The page."""
+    """The report as HTML; `origin` is the provenance of the folder."""
     by_claim = {
         answer.verdict.name: [
             (i, p) for i, p in enumerate(pictures, 1) if p.name.endswith(f"-{answer.verdict.name}")

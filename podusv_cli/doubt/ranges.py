@@ -34,13 +34,16 @@ Way = Callable[[float, Scenario, Key], DoubtRange | None]  # how a number of thi
 
 
 def _by_factor(alone: float, together: float) -> Way:
-    """A factor up to `alone` or its inverse, inside the key's bounds; of 0 there is none.
+    """A way to move a number by a factor up to `alone` or its inverse, inside the key's bounds.
 
-    `together` is the factor where all choices are drawn.
+    `together` is the factor where all choices are drawn. A number that is 0 has no such way.
     """
 
     def range_of_factor(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
-        """Factors of the scenario's value, as far as the key takes both ends; None if it cannot."""
+        """Factors of the scenario's value `own`, for the choice alone and for all together.
+
+        None if the value is 0, or the key's bounds leave no range on one side of 0.
+        """
         ends = [_inside([own / f, own * f], key) for f in (alone, together)]
         if not own or any(low * high <= 0.0 for low, high in ends):
             return None
@@ -52,13 +55,14 @@ def _by_factor(alone: float, together: float) -> Way:
 
 
 def _by_summand(scale: Callable[[Scenario], float], alone: float, together: float) -> Way:
-    """A summand up to a share of a scale, inside the key's bounds.
+    """A way to move a number by a summand up to a share of a scale, inside the key's bounds.
 
-    `alone` is the share where only this choice moves, `together` where all are drawn.
+    `scale` gives the size from the scenario. `alone` is the share where only this choice moves,
+    `together` where all are drawn.
     """
 
     def range_of_summand(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
-        """Summands to the scenario's value, in shares of `scale`; None where that is 0."""
+        """Summands to the scenario's value `own`, in shares of `scale`; None where that is 0."""
         if not (unit := scale(scenario)):
             return None
         ends = [
@@ -84,7 +88,7 @@ def _load(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
 
 
 def _inside(ends: list[float], key: Key) -> tuple[float, float]:
-    """The ends of a range, cut off at the key's bounds."""
+    """The least and the largest of `ends`, cut off at the key's bounds."""
     bounds = limits(key.field)
     low, high = sorted(ends)
     return max(low, bounds.get("ge", low)), min(high, bounds.get("le", high))

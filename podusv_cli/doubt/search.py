@@ -29,10 +29,11 @@ def search(
     workers: int = 0,
     progress: Callable[[str, float], None] | None = None,
 ) -> Tried:
-    """Try every choice alone, and draw all at once; shorter after an interrupt.
+    """Try every choice alone, and draw all at once; what is tried is shorter after an interrupt.
 
-    `judge` says what the claims answer in a world. `workers` is the number of processes, 0 for as
-    many as there are cores. `progress` is called with what is tried and its fraction that is done.
+    `claims` are by name, `moving` the choices. `judge` says what the claims answer in a world.
+    `workers` is the number of processes, 0 for as many as there are cores. `progress` is called
+    with what is tried and the fraction done.
     """
     base = judge({})
     numbers = {
@@ -55,7 +56,10 @@ def search(
 
 
 def _results_of(jobs: Sequence[Job], progress: Callable[[float], None], workers: int) -> list[Any]:
-    """The results of jobs up to the first that has none. Raises PodusvError for a failed one."""
+    """The results of jobs, in their order, up to the first without one.
+
+    A job has none where it was interrupted. Raises PodusvError for a failed one.
+    """
     outcomes = run_shares(jobs, progress, workers)
     for outcome in outcomes:
         if outcome.failure and not outcome.interrupted:
@@ -71,6 +75,10 @@ def _explore_choice(
     numbers: Mapping[str, Sequence[ClaimNumber]],
     tell: Callable[[float], None],
 ) -> TriedChoice:
+    """`explore_choice` as a job of a process, which an interrupt ends at once.
+
+    The arguments are its own; `tell` is not called, as a job has to take it.
+    """
     with interrupts_enabled():
         return explore_choice(choice, judge, base, numbers)
 

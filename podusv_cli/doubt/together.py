@@ -42,9 +42,10 @@ class Draws:
 
 
 def draw_worlds(choices: Sequence[Choice], seed: int, count: int) -> Draws:
-    """Draws of all numbers and rows among the choices but those that make another task.
+    """`count` draws of all numbers and rows among the choices but those that make another task.
 
-    A draw depends on the seed, the choice's name and the draw's number alone.
+    Numbers in which laws of one kind differ stay, too. A draw depends on the seed, the choice's
+    name and the draw's number alone.
     """
     moving = [c for c in choices if (c.range or c.rows) and not (c.task or c.beside)]
     shares = np.array(
@@ -69,7 +70,7 @@ def explain_turns(
     known: npt.NDArray[np.bool_],
     acting: Mapping[str, bool],
 ) -> list[Explained]:
-    """The parts of choices in which more draws turn than chance has it, the clearest first.
+    """The parts of choices in which more draws turn than chance would have, the clearest first.
 
     `turned` and `known` are (draws,); only draws in which the claim's answer is known count.
     `acting` says by name which choices change the number. The band is that of the clearest of all
@@ -79,8 +80,10 @@ def explain_turns(
     turned, shares = turned[known], draws.shares[known][:, rows]
     if not rows or not turned.any() or turned.all():
         return []
+    # Above the own value's share of 0.5, and in the outer quarters: far from it.
     parts = np.stack([shares > 0.5, abs(shares - 0.5) > 0.25])  # (part, draw, choice)
     differences = _differences(parts, turned)
+    # A fixed key: the same draws always give the same answer.
     shuffle = np.random.Generator(np.random.Philox(key=1)).permutation
     chance = [abs(_differences(parts, shuffle(turned))).max() for _ in range(PERMUTATIONS)]
     clear = [tuple(at) for at in np.argwhere(abs(differences) > np.quantile(chance, LEVEL))]
@@ -89,7 +92,10 @@ def explain_turns(
 
 
 def _differences(parts: Any, turned: Any) -> Any:
-    """Share of turned draws inside each part less that outside it."""
+    """Share of turned draws inside each part less that outside it; (part, choice).
+
+    `parts` is (part, draw, choice), `turned` (draw,).
+    """
     inside, outside = parts.sum(axis=1), (~parts).sum(axis=1)
     with np.errstate(all="ignore"):
         here, there = ((half * turned[:, None]).sum(axis=1) for half in (parts, ~parts))
@@ -97,7 +103,10 @@ def _differences(parts: Any, turned: Any) -> Any:
 
 
 def _describe_part(choice: Choice, part: int, inside: Any, turned: Any) -> Explained:
-    """How answers turn inside a part of a choice and outside it; True in `turned` (draws,)."""
+    """How answers turn in one part of a choice and outside it, named by where more of them turn.
+
+    `part` is its number in `explain_turns`; `inside` and `turned` are masks (draws,).
+    """
     shares = float(turned[inside].mean()), float(turned[~inside].mean())
     more = shares[0] > shares[1]
     word = (("below", "above"), ("near", "far from"))[part][more]

@@ -1,4 +1,4 @@
-"""Reading expressions: a syntax tree within limits, and what every mistake in one is told.
+"""Reading expressions: a syntax tree within limits, and a message for every mistake in one.
 
 They are parsed by Python, and evaluated by whoever gives them a meaning; never run as Python.
 """
@@ -44,7 +44,10 @@ class ExpressionError(ValueError):
 
 
 def syntax_tree(text: str, example: str) -> ast.expr:
-    """The syntax tree of an expression; messages show the example. Raises ExpressionError."""
+    """The syntax tree of an expression, within limits; `example` is shown in messages.
+
+    Raises ExpressionError.
+    """
     if len(text) > LONGEST:
         raise ExpressionError(f"is longer than {LONGEST} characters")
     try:
@@ -54,6 +57,7 @@ def syntax_tree(text: str, example: str) -> ast.expr:
         raise ExpressionError(f"cannot read {text!r}; example: {example}") from error
     if foreign := FOREIGN.search(text):
         raise ExpressionError(f"{foreign[0]!r} is no number; write it in decimal, without _")
+    # Counted level by level, since recursion could exceed Python's own limit.
     level: list[ast.AST] = [tree]
     for _ in range(DEEPEST):
         level = [child for node in level for child in ast.iter_child_nodes(node)]
@@ -82,7 +86,10 @@ def refuse(node: ast.AST, why: str) -> NoReturn:
 
 
 def known_name(name: str, names: Collection[str], what: str) -> str:
-    """The name, if it is one of these. Raises ExpressionError with the nearest that is."""
+    """The name, if it is one of `names`; `what` is the word for it in messages.
+
+    Raises ExpressionError, with the language that has the name, or the nearest that is known.
+    """
     if name in names:
         return name
     if homes := [home for home, functions in FUNCTIONS.items() if name in functions]:
@@ -109,7 +116,10 @@ def number(node: ast.expr) -> float:
 
 
 def literal(node: ast.expr) -> float:
-    """A number as written. Raises ExpressionError."""
+    """A number as it is written in an expression.
+
+    Raises ExpressionError for another node, and for numbers beyond LARGEST.
+    """
     number = getattr(node, "value", None)
     if isinstance(number, bool) or not isinstance(number, (int, float)):
         refuse(node, "not a plain number")

@@ -74,6 +74,7 @@ class Verdict(ABC):
     def row(self) -> str:
         """The verdict as a row of a table in Markdown."""
         claim, given = self.claim, getattr(self.claim, "given", "")
+        # Only some claims have a premise, those on single runs; a study's have no `given`.
         premise = f", given {markdown_code(given)}" if given else ""
         return (
             f"| {markdown_cell(self.name)} | "
@@ -108,7 +109,7 @@ class Answered(NamedTuple, Generic[AnyVerdict]):
 def by_answer(verdicts: Sequence[AnyVerdict]) -> list[Answered[AnyVerdict]]:
     """The verdicts with their numbers by answer, an answer that nobody got included.
 
-    Published claims come first. What cannot be told of either kind stands together, last.
+    Published claims come first. Open answers of both kinds stand together, last.
     """
     numbered = [*enumerate(verdicts, 1)]
     kinds = [kind for kind in (True, False) if kind in {v.published for v in verdicts}]

@@ -50,7 +50,7 @@ class Condition(NamedTuple):
 
 
 def all_of(conditions: Collection[Condition]) -> Condition:
-    """All of them: not where one is not, unknown where one is unknown, else yes."""
+    """All of the conditions: no where any is not, yes where all are, else unknown."""
     return Condition(
         reduce(np.logical_and, (condition.yes for condition in conditions)),
         reduce(np.logical_or, (condition.no for condition in conditions)),
@@ -69,11 +69,12 @@ class Logic(ABC):
         """A condition that is no comparison. Raises ExpressionError where the node is none."""
 
     def condition(self, node: ast.expr) -> Condition:
-        """Where a condition holds. Raises ExpressionError."""
+        """Where a condition holds and where it does not. Raises ExpressionError."""
         match node:
             case ast.Compare():
                 return self.comparison(node)
             case ast.UnaryOp(op=ast.Not(), operand=part):
+                # `not` exchanges yes and no; what is unknown stays so.
                 return Condition(*reversed(self.condition(part)))
             case ast.BoolOp(op=ast.And(), values=parts):
                 return all_of([self.condition(part) for part in parts])
@@ -97,14 +98,20 @@ class Walk(Logic):
 
     @abstractmethod
     def link(self, sign: ast.cmpop, left: ast.expr, a: Any, right: ast.expr, b: Any) -> Condition:
-        """Whether one side compares so with the next."""
+        """Whether one side (value `a`) compares with the next (`b`) as `sign` says.
+
+        `left` and `right` are the nodes of the sides, for messages.
+        """
 
     def calculate(self, operation: Callable[..., Any], parts: Sequence[Any]) -> Any:
         """The result of an operation."""
         return operation(*parts)
 
     def comparison(self, node: ast.Compare) -> Condition:
-        """All links of a < b <= c."""
+        """Where all links of a < b <= c hold.
+
+        Raises ExpressionError for a sign that the language lacks.
+        """
         if any(type(sign) not in self.signs for sign in node.ops):
             refuse(node, f"compare with {', '.join(SIGNS[sign] for sign in self.signs)}")
         sides = [(side, self.side(side)) for side in (node.left, *node.comparators)]
@@ -112,7 +119,10 @@ class Walk(Logic):
         return all_of([self.link(sign, *left, *right) for sign, (left, right) in links])
 
     def value(self, node: ast.expr) -> Any:
-        """What an expression without comparisons comes to. Raises ExpressionError."""
+        """What an expression without comparisons comes to: a number, or what `quantity` gives.
+
+        Raises ExpressionError.
+        """
         match node:
             case ast.Constant():
                 return np.float64(literal(node))

@@ -80,7 +80,7 @@ def _frames(runs: Sequence[Shown]) -> Iterator[Image.Image]:
 
 
 def _gif(frames: Iterator[Image.Image]) -> bytes:
-    """The pictures as a GIF."""
+    """The pictures as a GIF that repeats without end, with 64 colours each to keep it small."""
     first, *rest = (frame.quantize(colors=64, dither=Image.Dither.NONE) for frame in frames)
     buffer = io.BytesIO()
     first.save(buffer, "GIF", save_all=True, append_images=rest, duration=FRAME_MS, loop=0)
@@ -88,10 +88,11 @@ def _gif(frames: Iterator[Image.Image]) -> bytes:
 
 
 def _mp4(frames: Iterator[Image.Image]) -> bytes:
-    """The pictures as an MP4 film, by ffmpeg."""
+    """The pictures as an MP4 film, by ffmpeg. Raises CalledProcessError."""
     pictures = list(frames)
     size = "x".join(map(str, pictures[0].size))
     raw = ("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(1000 / FRAME_MS))
+    # ffmpeg cannot write such a film into a pipe.
     with TemporaryDirectory() as folder:  # its index is written last, at the beginning
         place = Path(folder, MP4)
         subprocess.run(
@@ -112,9 +113,9 @@ def frame_times(runs: Sequence[Shown]) -> list[float]:
 
 
 def stage(axes: Axes, runs: Sequence[Shown], *, near: bool = False) -> Callable[[float], None]:
-    """Draw what stands still; the function moves the rest to a time [s].
+    """Draw what stands still on `axes`, and return a function that moves the rest to a time [s].
 
-    A run that has ended stays where it is, its hull pale. `near`, the map goes with the first
+    A run that has ended stays where it is, its hull pale. With `near`, the map goes with the first
     target, or the first run where there is none, and hulls are to scale.
     """
     chased = [
@@ -132,6 +133,7 @@ def stage(axes: Axes, runs: Sequence[Shown], *, near: bool = False) -> Callable[
     followed = chased[0][0] if chased else runs[0].recording
     place = ("y_d", "x_d") if chased else ("y", "x")
     tracks = [axes.plot([], [], **run.line_style)[0] for run in runs]
+    # A hull has five corners; they are moved in each frame.
     hulls = [Polygon(np.zeros((5, 2)), color=run.color) for run in runs]
     for outline in hulls:
         axes.add_patch(outline)

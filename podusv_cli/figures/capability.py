@@ -21,13 +21,16 @@ PLACE = (0.1, 0.1, 0.8, 0.72)  # of the disc, in parts of the page
 def polar(found: Capability, words: str, columns: int = 1) -> Figure:
     """The largest load by where it comes from, the bow on top and starboard on the right.
 
-    A closed curve for all thrusters, and for those that are left without each; `words` say what
-    the radius is.
+    `found` has sizes (n,) at angles (n,) [rad]. A closed curve for all thrusters, and one for those
+    that are left without each; `words` say what the radius is. `columns` is the width in columns of
+    a page.
     """
     figure = new_figure(columns, HEIGHT)
     axes = cast("PolarAxes", figure.add_axes(PLACE, projection="polar"))
     axes.set_theta_zero_location("N")
+    # Angles grow clockwise, as headings do.
     axes.set_theta_direction(-1)
+    # The first point once more, so that the curve closes.
     around = np.append(found.angles, 2.0 * math.pi)
     for place, (name, sizes) in enumerate(found.held.items()):
         color, linestyle, _ = nth_style(place)

@@ -24,7 +24,10 @@ FAR = 1e9  # m; diverged runs end beyond any map
 
 
 def chase(runs: Sequence[Shown], frames: int = FRAMES) -> dict[str, Any]:
-    """Where runs and targets are at up to so many instants; {} where there is nothing to show."""
+    """Where runs and targets are at up to `frames` instants, as JSON takes it.
+
+    {} where no run has x, y and psi. `box` is west, south, east, north [m] of the map.
+    """
     moving = [run for run in runs if all(run.has(name) for name in WHERE)]
     if not moving:
         return {}
@@ -59,6 +62,7 @@ def _track(run: Shown, frames: int) -> dict[str, Any]:
     """
     count = len(run.recording["time"])
     rows = np.linspace(0, count - 1, min(count, frames)).round().astype(int)
+    # Runs with a distance z_e to a target have the target's place.
     names = ("time", *WHERE, *ON_EARTH, *(("x_d", "y_d") if run.has("z_e") else ()))
     away = next(filter(run.has, AWAY), None)
     legs = np.array(run.about.waypoints if run.about.follows else ())
@@ -85,6 +89,6 @@ def _track(run: Shown, frames: int) -> dict[str, Any]:
 def _round_numbers(
     numbers: Sequence[float] | Vector, digits: int = MILLIMETRES
 ) -> list[float | None]:
-    """The numbers in the room that the page has for them; None for none."""
+    """The numbers (n,) with so many digits after the point; None for NaN, which JSON lacks."""
     within = np.round(np.clip(numbers, -FAR, FAR), digits).tolist()
     return [None if math.isnan(x) else x for x in within]

@@ -37,11 +37,15 @@ HEIGHTS = {1: 1.25, 2: 1.4}  # inches of a row of panels, by the width in column
     "whole run, the settled part" + PEAKS,
 )
 def controls(runs: Sequence[Shown], columns: int) -> Figure:
-    """Surge force and yaw moment on the hull, and what the law demands where this differs."""
+    """Surge force and yaw moment on the hull, and what the law demands where this differs.
+
+    `columns` is the width in columns of a page: it decides how panels are arranged.
+    """
     spans = _spans(runs)
     loads = (*LOADS, SWAY) if any(run.has(SWAY[1]) for run in runs) else LOADS
     kinds = 2 if any(differ(run, *names) for run in runs for names in loads) else 1
     rows = kinds * (len(loads) if columns == 2 else len(spans))
+    # 0.7 inches are for the legend and the labels of the time axis.
     figure = new_figure(columns, 0.7 + HEIGHTS[columns] * rows)
     cells = _cells(figure, (len(loads), kinds), list(spans), columns)
     for (load, kind, part), axes in np.ndenumerate(cells):
@@ -59,9 +63,10 @@ def controls(runs: Sequence[Shown], columns: int) -> Figure:
 def _cells(
     figure: Figure, shape: tuple[int, int], parts: Sequence[str], columns: int
 ) -> NDArray[Any]:
-    """Panels by load, kind and part of the run, the parts side by side or above each other.
+    """Panels (loads, kinds, parts): parts of the run side by side, or one above the other.
 
-    `shape` is how many loads and kinds there are.
+    They stand above each other where the page has one column (`columns`). `shape` is how many loads
+    and kinds there are; `parts` are the names of the parts.
     """
     (loads, kinds), count = shape, len(parts)
     if columns == 2:
@@ -76,7 +81,7 @@ def _cells(
 
 
 def _spans(runs: Sequence[Shown]) -> dict[str, Span]:
-    """Names and limits [s] of the parts to show."""
+    """Names and limits [s] of the parts to show: the first moments, all, and the settled part."""
     start, end = min(run.start for run in runs), max(run.end for run in runs)
     period = min(float(np.diff(run.recording["time"][:2])[0]) for run in runs)
     settled, counted = min(run.steady_from for run in runs), max(run.counts_to for run in runs)
@@ -88,7 +93,10 @@ def _spans(runs: Sequence[Shown]) -> dict[str, Span]:
 
 
 def _panel(axes: Axes, runs: Sequence[Shown], shown: tuple[int, int], span: Span) -> None:
-    """One load during a part of the run: on the hull (kind 0) or as the law demands it (kind 1)."""
+    """One load during a part of the run [s]: `shown` is its place in LOADS, and its kind.
+
+    Kind 0 is the load on the hull, kind 1 the law's demand.
+    """
     load, kind = shown
     name = (*LOADS, SWAY)[load][kind]
     draw_signal(axes, runs, name, span=span)
@@ -103,16 +111,17 @@ def _panel(axes: Axes, runs: Sequence[Shown], shown: tuple[int, int], span: Span
 
 
 def _draw_claimed_peak(axes: Axes, runs: Sequence[Shown], name: str) -> None:
-    """Lines at the early peak of the demand that a claim names."""
+    """Lines at plus and minus the early peak of the demand `name` that a claim states."""
     for peak in {run.peaks[name] for run in runs if name in run.peaks}:
         for side in (peak, -peak):
             axes.axhline(side, label="peak that a claim names", **CLAIMED)
 
 
 def _limits(axes: Axes, runs: Sequence[Shown], load: int, span: Span) -> None:
-    """Lines at the actuators' constant limits, seen where the loads come near them."""
+    """Lines at the actuators' constant limits of a load (its place), over a span [s]."""
     limits = {limit for run in runs for limit in run.about.limits[load : load + 1]}
     for limit in sorted(limit for limit in limits if limit is not None):
         for side in (limit, -limit):
             line = np.array(span), np.array([side, side])
+            # Not fitted: limits far above the loads would flatten these.
             draw_curve(axes, line, fitted=False, label="limit of the actuator", **LIMIT)

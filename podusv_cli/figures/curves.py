@@ -40,12 +40,13 @@ class Beyond(SymmetricalLogLocator):
 
 
 def thin_curve(t: Vector, y: Vector, points: int = 1500) -> tuple[Vector, Vector]:
-    """At most about `points` samples that keep every extreme: the least and largest of each bin.
+    """About `points` samples that keep every extreme: the least and the largest of each bin.
 
     `t` [s] and `y` are (n,) both before and after.
     """
     if len(t) <= points:
         return t, y
+    # Rounded up; each bin gives two points.
     width = -(-len(t) // (points // 2))
     whole = (len(t) - 1) // width * width  # the rest after it is no longer than a bin
     bins, starts = y[:whole].reshape(-1, width), np.arange(0, whole, width)
@@ -57,11 +58,11 @@ def thin_curve(t: Vector, y: Vector, points: int = 1500) -> tuple[Vector, Vector
 def draw_signal(
     axes: Axes, runs: Sequence[Shown], name: str, *, span: Span | None = None, beside: str = ""
 ) -> None:
-    """Plot a signal of all runs that have it over time, or over a part of it [s].
+    """Plot a signal of all runs that have it over time, or over a part of it, `span` [s].
 
     `beside` another signal it is drawn thin, not in the legend, and only where the two differ.
-    Dense curves are fine; a curve lies below those that are calmer. The scale does not go down to
-    a ripple: what stays within RIPPLE of the signal's mean size is a flat line.
+    Dense curves are fine; a curve lies below those that are calmer. What varies by less than RIPPLE
+    of the signal's mean size is shown as a flat line.
     """
     having = [run for run in runs if run.has(name)]
     fitted = scaling(having, span)
@@ -77,14 +78,15 @@ def draw_signal(
         elif not beside:
             draw_run(axes, run, curve, fitted=run in fitted, **look)
         elif differ(run, name, beside):
+            # A label with _ in front is not in the legend.
             thin = {**run.line_style, **THIN, "label": f"_{run.name}, {name}"}
-            draw_own(axes, run, curve, fitted=run in fitted, **thin)
+            draw_run_curve(axes, run, curve, fitted=run in fitted, **thin)
     sizes = [mean_size(run, name) for run in fitted if run.whole and run.has(name)]
     _widen(axes, max(sizes, default=0.0))
 
 
 def _widen(axes: Axes, size: float) -> None:
-    """Give what is drawn a range of at least RIPPLE of this size."""
+    """Give what is drawn a vertical range of at least RIPPLE of `size`, about its middle."""
     low, high = axes.dataLim.intervaly
     if high - low < RIPPLE * size:
         ends = 0.5 * (low + high) + 0.5 * RIPPLE * size * np.array([-1.0, 1.0])
@@ -92,7 +94,10 @@ def _widen(axes: Axes, size: float) -> None:
 
 
 def _way(y: Vector) -> float:
-    """How far a signal y (n,) goes up and down in all, as far as a page can show it."""
+    """How far a signal y (n,) goes up and down in all, as far as a page can show it.
+
+    In y's unit; thinned first, since noise between two pixels is not seen.
+    """
     _, few = thin_curve(np.arange(len(y), dtype=float), y)
     return float(np.sum(np.abs(np.diff(few, axis=0))))
 
@@ -103,12 +108,13 @@ def _draw_components(axes: Axes, run: Shown, curve: tuple[Vector, Vector], *, fi
     for number, y in enumerate(vectors.reshape(len(t), -1).T):
         name = run.line_style["label"] if not number else f"_{number}"
         look = {**run.line_style, **THIN, "label": name}
-        draw_own(axes, run, (t, y), fitted=fitted, **look)
+        draw_run_curve(axes, run, (t, y), fitted=fitted, **look)
 
 
 def draw_shared(axes: Axes, runs: Sequence[Shown], name: str) -> None:
-    """Plot a signal over time, once where all runs have the same."""
+    """Plot the signal `name` over time, once where all runs have the same."""
     having = [run for run in runs if run.has(name)]
+    # The others are compared with it as long as they last.
     longest = max(having, key=lambda run: run.end)
     if len(runs) > 1 and all(_same(run, longest, name) for run in having):
         draw_curve(axes, longest.during(name, None), fitted=True, **COMMON)
@@ -126,11 +132,12 @@ def _same(run: Shown, longest: Shown, name: str) -> bool:
 def draw_run(
     axes: Axes, run: Shown, curve: tuple[Vector, Vector], *, fitted: bool, **look: Any
 ) -> None:
-    """Plot a curve over time as the run's own, with its markers, and what else its look has.
+    """Plot a `curve` (t [s], y), each (n,), in the look of its run, with the run's markers.
 
-    A run that did not finish has an x below the instant of its end; the curve may end anywhere.
+    `look` is added to that of the run; `fitted` is as in `draw_run_curve`. A run that did not
+    finish has an x below the instant of its end; the curve may end anywhere.
     """
-    mark(draw_own(axes, run, curve, fitted=fitted, **run.line_style, **look), run)
+    mark(draw_run_curve(axes, run, curve, fitted=fitted, **run.line_style, **look), run)
     if not run.whole and len(curve[0]) and curve[0][-1] == run.end:
         below = axes.get_xaxis_transform()
         axes.plot([run.end], [0.0], transform=below, clip_on=False, color=run.color, **CUT)
@@ -139,10 +146,12 @@ def draw_run(
 def mark(line: Line2D, run: Shown, t: Vector | None = None) -> None:
     """Put the run's markers on a curve, at their places in time.
 
-    `t` are the instants of the curve's points, where these are not its horizontal positions.
+    `t` (n,) [s] are the instants of the curve's points, where these are not its horizontal
+    positions.
     """
     instants = np.asarray(line.get_xdata() if t is None else t)
     if len(instants) and run.marker:
+        # Places are fractions of the time that the curve covers.
         at = instants[0] + run.look.places * (instants[-1] - instants[0])
         rows = np.minimum(np.searchsorted(instants, at), len(instants) - 1)
         line.set(marker=run.marker, markevery=rows.tolist(), **MARK)
@@ -160,6 +169,7 @@ def draw_curve(axes: Axes, curve: tuple[Vector, Vector], *, fitted: bool, **look
     t, y = thin_curve(*curve)
     if fitted:
         return axes.plot(t, y, **look)[0]
+    # `axes.plot` would fit both scales; here only the horizontal one grows.
     line = Line2D(t, y, **look)
     if len(t):
         axes.add_artist(line)
@@ -167,23 +177,29 @@ def draw_curve(axes: Axes, curve: tuple[Vector, Vector], *, fitted: bool, **look
     return line
 
 
-def draw_own(
+def draw_run_curve(
     axes: Axes, run: Shown, curve: tuple[Vector, Vector], *, fitted: bool, **look: Any
 ) -> Line2D:
-    """Plot a curve (t, y) of a run, grey after the end of its path.
+    """Plot a curve of a run, grey after the end of its path; the line up to there.
 
-    No metric and no scale counts what comes after that.
+    `curve` is (t [s], y), each (n,). The scale of the axes fits it only where it is `fitted`;
+    `look` are keyword arguments of a line. No metric and no scale counts what comes after the path.
     """
     t, y = curve
     last = int(np.searchsorted(t, run.counts_to, side="right"))
     if 0 < last < len(t):
+        # matplotlib leaves labels that begin with _ out of the legend.
         grey = {**look, **AFTER, "label": f"_{run.name}, after its path"}
+        # From the last counted point on, so that no gap is left between the two.
         draw_curve(axes, (t[last - 1 :], y[last - 1 :]), fitted=False, **grey)
     return draw_curve(axes, (t[:last], y[:last]), fitted=fitted, **look)
 
 
 def compress(axes: Axes, runs: Sequence[Shown], name: str) -> None:
-    """Make the axis logarithmic beyond a signal's usual values where its peaks dwarf them."""
+    """Make the vertical axis logarithmic beyond usual values where peaks dwarf them.
+
+    `name` is the signal; `axes` has its curves already.
+    """
     linear = linear_up_to(runs, name, max(abs(limit) for limit in axes.dataLim.intervaly))
     if linear:
         axes.set_yscale("symlog", linthresh=linear)

@@ -46,7 +46,7 @@ def figures_of(plugins: Iterable[Plugins]) -> dict[str, Sheet]:
 def choose_sheets(names: Sequence[str], runs: Sequence[Shown], extras: Extras) -> list[Sheet]:
     """The figures of these names or `ALL` that fit; without names, the `USUAL` and plug-ins' own.
 
-    One that is named and that no run has signals for is missing among the `extras`.
+    One that is named and that no run has signals for is noted as missing in `extras`.
     """
     known = figures_of(shown.run.plugins for shown in runs)
     fitting = {name: sheet for name, sheet in known.items() if sheet.fits(runs)}
@@ -61,7 +61,10 @@ def choose_sheets(names: Sequence[str], runs: Sequence[Shown], extras: Extras) -
 def draw(
     runs: Sequence[Shown], sheets: Iterable[Sheet], formats: Sequence[str], look: Look = SCREEN
 ) -> Iterator[tuple[str, bytes]]:
-    """File name and content of each figure that fits the runs, in each format."""
+    """File name and content of each figure that fits the runs, in each of `formats`.
+
+    `look` says size and style.
+    """
     with house_style(look.style), np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of numbers near the end of all, as diverged runs have
         for sheet in (sheet for sheet in sheets if sheet.fits(runs)):
@@ -80,10 +83,11 @@ def draw_in_parallel(
     progress: Progress = lambda fraction: None,
     workers: int = 0,
 ) -> dict[str, bytes]:
-    """The same as `draw`, in processes of their own, each of which draws several figures.
+    """The files of `draw` by name, drawn in processes of their own.
 
-    A figure that fails is missing among the `extras`. `progress` is called with the fraction of
-    figures that are over. Raises KeyboardInterrupt where one was interrupted.
+    Each process draws several figures. A figure that fails is noted in `extras`. `progress` is
+    called with the fraction of figures that are over. `workers` is how many processes draw at a
+    time (0: one a core). Raises KeyboardInterrupt where one was interrupted.
     """
     sheets = tuple(sheets)
 
@@ -110,7 +114,7 @@ def draw_in_parallel(
 def check_names(
     figures: Sequence[str], formats: Sequence[str], sheets: Iterable[str] = FIGURES
 ) -> None:
-    """UsageError for a figure, of all `sheets`, or format that there is not."""
+    """Raise UsageError for a figure or format that there is not; `sheets` are the known figures."""
     named = (*sheets, ALL)
     for what, names, known in (("figure", figures, named), ("format", formats, FORMATS)):
         for name in names:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE, Signal
-from podusv_cli.figures.curves import draw_curve, draw_own, draw_run, thin_curve
+from podusv_cli.figures.curves import draw_curve, draw_run, draw_run_curve, thin_curve
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.scales import scaling
 from podusv_cli.figures.sheet import figure
@@ -61,11 +61,16 @@ def _alone(run: Shown, columns: int) -> Figure:
 
 
 def _small_multiples(runs: Sequence[Shown], columns: int) -> Figure:
-    """The errors of every run in a column of its own; many runs in blocks below each other."""
+    """The errors of every run in a column of its own; many runs in blocks below each other.
+
+    `columns` is the width in columns of a page.
+    """
     blocks = -(-len(runs) // ABREAST[columns])
     abreast = -(-len(runs) // blocks)
+    # Each block has 0.4 inches for the names of its runs; 0.7 are for legend and time axis.
     figure = new_figure(columns, 0.7 + 0.4 * blocks + SMALL_HEIGHT * blocks * len(STATE))
     cells = figure.add_gridspec(blocks * len(STATE), abreast)
+    # Letters of a name that fit above a column, less the panel's own letter.
     longest = int(WIDTHS[columns] / abreast / LETTER) - len("(aa) ...")
     fitted, first = scaling(runs), dict[int, Axes]()
     for number, run in enumerate(runs):
@@ -80,6 +85,7 @@ def _small_multiples(runs: Sequence[Shown], columns: int) -> Figure:
             _draw(axes, run, state.name, fitted=run in fitted, error=True)
             _shade([axes], [run], place)
             axes.tick_params(labelbottom=place == len(STATE) - 1, labelleft=column == 0)
+            # A panel is too low for the label in one line.
             axes.set_ylabel("" if column else _error_label(state).replace(" $", "\n$"))
         axes.set_xlabel(TIME)
         axes.figure.axes[-len(STATE)].set_title(shorten(run.name, longest), loc="left")
@@ -92,11 +98,14 @@ def _error_label(state: Signal) -> str:
 
 
 def _draw(axes: Axes, run: Shown, name: str, *, fitted: bool, error: bool) -> None:
-    """The estimate of a quantity over truth and measured values, or both less the truth."""
+    """The estimate of a quantity over truth and measured values; with `error`, both less the truth.
+
+    `name` is the quantity in STATE; the scale fits the curves where they are `fitted`.
+    """
     t, true = run.during(name, None)
     less = true if error else np.zeros_like(true)
     if not error:
-        draw_own(axes, run, (t, true), fitted=fitted, color=run.color, label="_true", **TRUE)
+        draw_run_curve(axes, run, (t, true), fitted=fitted, color=run.color, label="_true", **TRUE)
     measured = f"{name}_m"
     if run.has(measured):
         fresh = _fresh(run.signal(measured))
@@ -111,7 +120,10 @@ def _fresh(measured: Vector) -> NDArray[np.intp]:
 
 
 def _shade(panels: Sequence[Axes], runs: Sequence[Shown], place: int) -> None:
-    """Shade the outages of the sensor of this quantity, in any of the runs."""
+    """Shade the outages of a quantity's sensor in any of the runs.
+
+    `place` is the quantity's in STATE.
+    """
     start, end = min(run.start for run in runs), max(run.end for run in runs)
     spans = {
         (max(first, start), min(last, end))

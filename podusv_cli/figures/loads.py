@@ -47,13 +47,14 @@ def _limits(axes: Axes, runs: Sequence[Shown]) -> None:
         axes.broken_barh(spells, (place - 0.3, 0.6), color=run.color, linewidth=0.6)
         axes.plot([run.start, run.end], [place, place], color=run.color, linewidth=0.4)
     axes.set_yticks(range(len(runs)), [run.name for run in runs])
+    # The first run stands on top.
     axes.set_ylim(len(runs) - 0.4, -0.6)
     axes.set_title("limited by the actuator")
     axes.grid(visible=False, axis="y")
 
 
 def _spells(t: Vector, on: Vector) -> Iterator[tuple[float, float]]:
-    """Start and length [s] of every stretch of rows that are on."""
+    """Start and length [s] of every stretch of rows in which `on` (n,) is 1; `t` (n,) [s]."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0.0], on > 0.5, [0.0]])))
     for first, after in edges.reshape(-1, 2):
         yield float(t[first]), float(t[min(after, len(t) - 1)] - t[first])

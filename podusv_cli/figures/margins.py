@@ -17,7 +17,11 @@ CURVES = {"S": "sensitivity |S|", "T": "complementary sensitivity |T|"}
 
 
 def sensitivities(laws: Mapping[str, LoopMargins], columns: int = 2) -> Figure:
-    """|S| and |T| of the loops, side by side, a curve for each law by label that has the loop."""
+    """|S| and |T| over frequency: a row of panels each, a column a loop, a curve a law.
+
+    `laws` are by label; one without a loop has no curve there. `columns` is the width of the
+    figure.
+    """
     figure = new_figure(columns, HEIGHT)
     loops = [axis for axis in AXES if any(axis in law.loops for law in laws.values())]
     panels = figure.subplots(2, len(loops), sharex="col", sharey=True)

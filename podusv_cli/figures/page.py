@@ -62,7 +62,10 @@ class Page(Figure):
         super().draw(renderer)
 
     def resize(self, width: float, height: float) -> None:
-        """Give the page another size [inches]; its legends get as many rows as that asks for."""
+        """Give the page another size [inches].
+
+        Its legends get as many rows as the new width asks for.
+        """
         self.set_size_inches(width, height)
         keys, self.keys = self.keys, []
         for legend in list(self.legends):
@@ -73,13 +76,14 @@ class Page(Figure):
     def narrow(self, width: float) -> bool:
         """Give the page this width [inches] and its panels fewer columns; False where it cannot.
 
-        A row of panels, each with labels of its own, becomes a column; others that say what is
-        along them stand in two. Rows and columns that mean something stay, up to two columns.
+        A row of panels, each with labels of its own, becomes a column; others with labels below
+        them stand in two. A grid whose rows and columns mean something stays, up to two columns.
         """
         panels = [axes for axes in self.axes if axes.get_visible()]
         specs = [axes.get_subplotspec() for axes in panels]
         grids = {spec.get_gridspec() if spec else None for spec in specs}
         grid, height = grids.pop() if len(grids) == 1 else None, self.get_figheight()
+        # Panels that share the labels of the lowest row cannot be moved apart.
         if grid and all(axes.get_xlabel() for axes in panels):
             single = grid.nrows == 1 and all(axes.get_ylabel() for axes in panels)
             columns = 1 if single else min(grid.ncols, 2)
@@ -97,11 +101,15 @@ class Page(Figure):
         return True
 
     def add_key(self, handles: Sequence[Any], names: Sequence[str], *, below: bool = False) -> None:
-        """A legend above (or below) all panels, in as few rows as its names fit into."""
+        """A legend above (or below) all panels, in as few rows as its names fit into.
+
+        `handles` and `names` are as for matplotlib's legend.
+        """
         size = FontProperties(size=rcParams["legend.fontsize"]).get_size_in_points()
         room = (HANDLE + rcParams["legend.handlelength"]) * size * POINT
         wide = [room + text_width(name, size) for name in names]
         count = len(names)
+        # Fewer columns until the widest names of all columns fit side by side.
         while count > 1 and sum(map(max, np.array_split(wide, count))) > self.get_figwidth():
             count -= 1
         taken = (-(-len(names) // count) * ROW * size + GAP) * POINT
@@ -119,14 +127,18 @@ class Page(Figure):
         self.foot, self.head = (taken, self.head) if below else (self.foot, taken)
 
     def add_line(self, text: str) -> None:
-        """A line of text below all panels and legends."""
+        """A line of text below all panels and legends; the next one goes below it."""
         size = FontProperties(size=rcParams["legend.fontsize"]).get_size_in_points()
         place = (self.foot + EDGE) / self.get_figheight()
         self.text(0.5, place, text, ha="center", va="bottom", fontsize=size)
         self.foot += (ROW * size + GAP) * POINT
 
     def arrange(self) -> None:
-        """Give every panel its place: around it, what its own labels, title and numbers take."""
+        """Give every panel its place: around it, what its own labels, title and numbers take.
+
+        Heights come first: which numbers an axis has depends on its height, and the room at the
+        left depends on the numbers.
+        """
         panels = [axes for axes in self.axes if axes.get_visible() and axes.get_subplotspec()]
         if not panels:
             return
@@ -168,7 +180,11 @@ class Page(Figure):
 def _most(
     spans: Sequence[range], before: Iterable[float], after: Iterable[float], count: int
 ) -> tuple[list[float], list[float]]:
-    """What every row or column needs before and after it, by the panels that begin or end there."""
+    """What every row or column needs before and after it, by the panels that begin or end there.
+
+    `spans` are the rows (or columns) of each panel, `before` and `after` its needs [inches];
+    `count` is how many rows there are.
+    """
     needed = [0.0] * count, [0.0] * count
     for span, one, other in zip(spans, before, after, strict=True):
         needed[0][span.start] = max(needed[0][span.start], one)
@@ -183,7 +199,13 @@ def _spread(
     before: Sequence[float],
     after: Sequence[float],
 ) -> tuple[Vector, Vector]:
-    """Where rows or columns of these ratios begin and end [inches]."""
+    """Where each row (or column) of panels begins and ends [inches], two arrays (rows,).
+
+    `size` [inches] is that of the page; `ratios` (rows,) say how the panels share what is free.
+    Also in [inches], `edges` are free at both ends of the page, and `before` and `after` at each
+    row, for its labels.
+    """
+    # Labels that need more than the page would leave nothing of the panels.
     free = max(size - sum(edges) - sum(before) - sum(after), 0.2 * size)
     own = free * ratios / np.sum(ratios)
     whole = np.asarray(before) + own + np.asarray(after)
@@ -192,7 +214,7 @@ def _spread(
 
 
 def text_width(text: str, size: float) -> float:
-    """About the width of a line in letters of this size [points], in inches."""
+    """About the width [inches] of a line of `text` in letters of this size [points]."""
     letters = (
         WIDE if c in WIDE_LETTERS else NARROW if c in NARROW_LETTERS else USUAL for c in text
     )
@@ -252,7 +274,7 @@ def _reach(axis: Axis) -> float:
 
 
 def _texts(axis: Axis) -> list[str]:
-    """What stands at the ticks that are seen, and the factor of all numbers."""
+    """The texts at the ticks that are seen, and last the factor of all numbers, often ""."""
     shown: list[str] = []
     for locations, formatter in (
         (axis.get_majorticklocs(), axis.get_major_formatter()),
@@ -260,11 +282,15 @@ def _texts(axis: Axis) -> list[str]:
     ):
         texts = formatter.format_ticks(list(locations))
         shown += [t for t, seen in zip(texts, _visible_ticks(axis, locations), strict=True) if seen]
+    # Read last: a formatter computes the factor with the ticks.
     return [*shown, axis.get_major_formatter().get_offset()]  # which depends on the numbers
 
 
 def _visible_ticks(axis: Axis, locations: Locations) -> Any:
-    """Which ticks lie on the axis."""
+    """Which ticks at `locations` (n,) lie on the axis, as a mask (n,).
+
+    RASTER of the axis's length is allowed beyond both ends, for rounding.
+    """
     change = axis.get_transform().transform
     low, high = sorted(change(np.asarray(axis.get_view_interval(), float)))
     at, room = change(np.asarray(locations, float)), RASTER * (high - low)
@@ -272,7 +298,7 @@ def _visible_ticks(axis: Axis, locations: Locations) -> Any:
 
 
 def _put_labels(axes: Axes, numbers: float) -> None:
-    """Put the labels beyond the numbers, those of one column in one line."""
+    """Put the labels beyond the numbers [inches], those of one column of panels in one line."""
     inches = axes.figure.dpi_scale_trans
     away = ScaledTranslation(-max(numbers, SIDE) - GAP * POINT, 0.0, inches)
     axes.yaxis.set_label_coords(0.0, 0.5, axes.transAxes + away)
@@ -317,10 +343,12 @@ class _Stamped(Axis, ABC):
             seen = _visible_ticks(self, found) if len(found) else []
             if not any(seen):
                 continue
+            # One tick of the kind is enough: it is moved.
             ticks = self.get_major_ticks(1) if which is self.major else self.get_minor_ticks(1)
             kept = [text for text, shown in zip(texts, seen, strict=True) if shown]
             self.stamp(ticks[0], np.asarray(found, float)[seen], kept, renderer)
         self.label.draw(renderer)
+        # The factor of all numbers, as 1e3.
         self.offsetText.set_text(self.get_major_formatter().get_offset())
         if self.offsetText.get_text():
             self.place_factor()
@@ -331,7 +359,11 @@ class _Stamped(Axis, ABC):
     def stamp(
         self, tick: Tick, places: Vector, texts: Sequence[str], renderer: RendererBase
     ) -> None:
-        """Draw a tick at all places, with its text."""
+        """Draw a tick at all places (n,), with its text, grid line and mark.
+
+        Grid lines are one line with gaps (NaN), and marks one line of markers: few objects draw
+        faster.
+        """
         flat = np.zeros_like(places)
         if tick.gridline.get_visible():
             along = np.repeat(places, 3)

@@ -63,8 +63,12 @@ def signals(*names: str) -> Sheet:
 
 
 def grid(count: int, columns: int) -> tuple[Page, list[Axes]]:
-    """A figure with panels over one time, row by row; one alone in the last row fills it."""
+    """A figure with `count` panels over one time, row by row, so many columns of a page wide.
+
+    A panel that is alone in the last row fills it.
+    """
     rows = math.ceil(count / columns)
+    # 0.7 inches are for the legend and the labels of the time axis.
     figure = new_figure(columns, 0.7 + PANEL_HEIGHT * rows)
     cells = figure.add_gridspec(rows, columns)
     alone = count % columns == 1 < columns
@@ -99,6 +103,7 @@ def _sheet(
     compressed: bool = False,
     source: str = "",
 ) -> Sheet:
+    """A figure of these signals over time; the arguments are those of `figure` and its family."""
     family = signals_over_time(*signals, scales=scales, compressed=compressed)
     return figure(name, caption=caption, signals=signals, place=place, source=source)(family)
 

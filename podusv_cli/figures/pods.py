@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.curves import THIN, draw_own, draw_run
+from podusv_cli.figures.curves import THIN, draw_run, draw_run_curve
 from podusv_cli.figures.scales import scaling
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.shown import Shown, axis_label, constants
@@ -49,11 +49,14 @@ def pods(runs: Sequence[Shown], columns: int) -> Figure:
 
 
 def _draw(axes: Axes, run: Shown, names: tuple[str, str], pod: int, *, fitted: bool) -> None:
-    """Draw what one pod does, and thin what it is asked for; `names` are (actual, asked)."""
+    """Draw what one pod (from 0) does, and thin what it is asked for.
+
+    `names` are (actual, asked).
+    """
     actual, asked = names
     thin: dict[str, Any] = {**run.line_style, **THIN, "label": f"_{run.name}, {asked}"}
     if _has(run, asked, pod):
-        draw_own(axes, run, _curve(run, asked, pod), fitted=fitted, **thin)
+        draw_run_curve(axes, run, _curve(run, asked, pod), fitted=fitted, **thin)
     if _has(run, actual, pod):
         draw_run(axes, run, _curve(run, actual, pod), fitted=fitted)
 

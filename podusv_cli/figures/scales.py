@@ -11,7 +11,7 @@ from podusv_cli.figures.shown import Shown
 
 TALL = 20.0  # a peak this many times the usual values gets a logarithmic axis
 DECADES = 4  # at most, on the logarithmic axis of runs that finished
-USUAL = 0.1  # of a signal's mean size: where a run settles below this, so much is usual in it
+USUAL = 0.1  # of a signal's mean size: where a run settles below this, this is the usual size
 SAMPLES = 1000  # of a signal, about, for what is usual in it
 DIP = 0.02  # of the run; a distance that is smaller for less than this is a passage
 
@@ -29,7 +29,10 @@ def scaling(runs: Sequence[Shown], span: Span | None = None) -> list[Shown]:
 
 
 def linear_up_to(runs: Sequence[Shown], name: str, peak: float) -> float | None:
-    """The size beyond which an axis is logarithmic, as the peak dwarfs what is usual, or None."""
+    """The size beyond which an axis of signal `name` is logarithmic; None where it is linear.
+
+    That is so where the `peak` dwarfs what is usual; the size is a power of ten.
+    """
     kept = scaling([run for run in runs if run.has(name)])
     usual = max(_usual(run, name) for run in kept)
     if any(run.whole for run in kept):
@@ -38,9 +41,9 @@ def linear_up_to(runs: Sequence[Shown], name: str, peak: float) -> float | None:
 
 
 def _usual(run: Shown, name: str) -> float:
-    """The largest settled value, or a share of the mean size, below which there is only noise.
+    """The usual size of a signal: its largest settled value, or a share of its mean size if larger.
 
-    Of a run that did not get there, the median.
+    Of a run that did not get to its settled part, the median.
     """
     values = run.signal(name)
     counted = slice(*np.searchsorted(run.recording["time"], [run.steady_from, run.counts_to]))
@@ -58,9 +61,10 @@ def mean_size(run: Shown, name: str) -> float:
 
 
 def smallest_distance(runs: Sequence[Shown]) -> float:
-    """The smallest distance [m] worth showing: a step's way, or less where a vessel stays nearer.
+    """The smallest distance [m] worth showing.
 
-    How near a vessel comes in passing depends on where the steps happen to fall.
+    It is the way of a step, or less where a vessel stays nearer. How near a vessel comes in passing
+    depends on where the steps happen to fall.
     """
     return min(
         _smallest_distance_of(run) for run in runs if run.has("u")

@@ -38,9 +38,9 @@ class Sheet:
 def figure(
     name: str, *, caption: str, signals: tuple[str, ...], place: int = 100, source: str = ""
 ) -> Callable[[Family], Sheet]:
-    """Register a function that draws runs which have one of these signals.
+    """Register a function that draws runs which have one of these `signals`, as a decorator.
 
-    Figures are shown in the order of their places, those of one place by name.
+    Figures are shown in the order of their `place`, those of one place by name.
     """
     return lambda family: Sheet(name, caption, signals, place, _letter_panels(family), source)
 

@@ -111,7 +111,7 @@ class Shown:
 
     @property
     def line_style(self) -> dict[str, Any]:
-        """Keyword arguments of `Axes.plot`; a legend tells how a run ended that did not finish."""
+        """Keyword arguments of `Axes.plot`; a legend says how a run ended that did not finish."""
         ending = "" if self.whole else f" ({self.recording.status} at {self.end:g} s)"
         return {"color": self.color, "linestyle": self.linestyle, "label": self.name + ending}
 
@@ -136,7 +136,7 @@ class Shown:
         return self.run.signal(name)
 
     def during(self, name: str, span: tuple[float, float] | None) -> tuple[Vector, Vector]:
-        """Time and a signal, all of it or that of a part [s]."""
+        """Time [s] and a signal, each (rows,), all of it or that during `span` [s]."""
         t, y = self.recording["time"], self.signal(name)
         first, last = span or (t[0], t[-1])
         inside = slice(np.searchsorted(t, first), np.searchsorted(t, last, side="right"))
@@ -165,7 +165,10 @@ def axis_label(runs: Sequence[Shown], name: str) -> str:
 
 
 def constants(runs: Sequence[Shown], names: Iterable[str]) -> dict[str, str]:
-    """The signals that no run changes, each with its value in words; none where all are such."""
+    """The signals that no run changes, each with its value in words; none where all are such.
+
+    A figure of constants alone would have no panel.
+    """
     held: dict[str, str] = {}
     names = [name for name in names if any(run.has(name) for run in runs)]
     for name in names:
@@ -173,6 +176,7 @@ def constants(runs: Sequence[Shown], names: Iterable[str]) -> dict[str, str]:
         if all(np.ptp(value) == 0.0 for value in values.values()):
             levels = {label: f"{value.flat[0]:.4g}" for label, value in values.items()}
             levels_in_words = ", ".join(f"{level} ({label})" for label, level in levels.items())
+            # One value for all runs, or each run's own.
             level = levels_in_words if len({*levels.values()}) > 1 else next(iter(levels.values()))
             held[name] = f"${about(runs, name).symbol}$ = {level} {unit(about(runs, name))}"
     return held if len(held) < len(names) else {}
@@ -194,7 +198,7 @@ def shorten(text: str, most: int) -> str:
 
 
 def places(place: int, count: int) -> Vector:
-    """Fractions of a curve where the run in this place of so many has its markers.
+    """Fractions of a curve (marks,) where the run in this place of `count` has its markers.
 
     Those of one run stand midway between those of others, so that equal curves show all of them.
     """

@@ -36,9 +36,9 @@ class Sketch:
 def render_sketches(
     sketches: Iterable[Sketch], extras: Extras
 ) -> tuple[dict[str, bytes], list[Picture]]:
-    """PNG pictures of figures, drawn in processes of their own: by file name, and of a report.
+    """PNG pictures of figures, drawn in processes of their own: by file name, and for a report.
 
-    A figure that cannot be drawn is missing among the `extras`.
+    A figure that cannot be drawn is noted in `extras`, and so is an interrupt.
     """
     files: dict[str, bytes] = {}
     pictures: list[Picture] = []
@@ -58,7 +58,7 @@ def render_sketches(
 
 
 def _images(sketch: Sketch, tell: Callable[[float], None]) -> tuple[bytes, bytes]:
-    """The figure as a PNG, and as one for a phone where its panels fit there."""
+    """The figure as a PNG, and as one for a phone where its panels fit there, else b""."""
     with interrupts_enabled(), house_style(), np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of numbers near the end of all, as diverged runs have
         figure = sketch.draw()

@@ -56,17 +56,23 @@ def spectrum(runs: Sequence[Shown], columns: int) -> Figure:
 
 
 def _draw(axes: Axes, run: Shown, name: str, **look: Any) -> Line2D:
-    """The harmonics of one signal's settled part."""
+    """Draw the rms of each harmonic of one signal's settled part over frequency; the line."""
     rates, power = periodogram(*run.during(name, (run.steady_from, run.counts_to)))
+    # Rate 0, the mean, has no place on a logarithmic axis.
     return axes.plot(rates[1:], np.sqrt(power[1:]), **look)[0]
 
 
 def _scales(axes: Axes) -> None:
-    """Both axes logarithmic, over some decades below the largest harmonic."""
+    """Make both axes logarithmic, and cut off small harmonics.
+
+    The vertical axis begins DECADES below the largest harmonic; the other ends at the last harmonic
+    above that.
+    """
     curves = [np.array(line.get_data()) for line in axes.lines]
     top = max((float(np.max(rms, initial=0.0)) for _, rms in curves), default=0.0)
     if np.isfinite(top) and top > 0.0:
         floor = top * 10.0**-DECADES
         last = max(float(np.max(rates[rms > floor], initial=0.0)) for rates, rms in curves)
+        # Some room is left above the highest and beyond the last harmonic that is shown.
         axes.set(xscale="log", yscale="log", ylim=(floor, 3.0 * top))
         axes.set_xlim(right=1.1 * last)

@@ -24,7 +24,7 @@ from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.theory.lyapunov import TERMS, V_DOT, V
 
 POINTS = 600  # of a stack; every column is a mean, so that no extreme stands for its surroundings
-FAR = 100.0  # a bound this many times above all of V is left out of the picture and told in words
+FAR = 100.0  # a bound this many times above all of V is left out of the picture and given in words
 LAYERS = {
     "z_e": "#0072B2",
     r"\psi_e": "#56B4E9",
@@ -58,6 +58,7 @@ def stability(runs: Sequence[Shown], columns: int) -> Figure:
     V of a single run is stacked by its terms, with its bound over the stack.
     """
     runs = [run for run in runs if run.has("V")]
+    # In inches: 1.5 a panel, of which two have all runs, and 0.6 for the keys.
     figure = new_figure(columns, 3.6 + 1.5 * len(runs))
     over_time = figure.subplots(2 + len(runs), 1, sharex=True)
     draw_V = _curves if len(runs) > 1 else _stack
@@ -93,7 +94,7 @@ def _stack(axes: Axes, runs: Sequence[Shown]) -> None:
 
 
 def _ultimate(axes: Axes, runs: Sequence[Shown]) -> None:
-    """The bound of V in each part of every run, drawn or, where it is far off, told in words."""
+    """The bound of V in each part of every run: drawn, or put into words where it is far off."""
     largest = max(float(np.max(run.signal("V"))) for run in scaling(runs))
     lines, top = [], largest
     for run in runs:
@@ -104,6 +105,7 @@ def _ultimate(axes: Axes, runs: Sequence[Shown]) -> None:
             else:
                 size = f"{bound:.2g}, not drawn" if math.isfinite(bound) else "none"
                 lines.append(f"bound of {run.name} from {start:g} s on: {size}")
+    # The axis is logarithmic: the room above is that of a factor of two.
     axes.set_ylim(top=2.0 * top)
     axes.plot([], [], color="#444444", linewidth=THIN, label=r"thin: bound $\Delta/2\lambda$")
     if lines:
@@ -124,7 +126,7 @@ def _bounds(run: Shown) -> Iterator[tuple[float, float, float]]:
 
 
 def _rate(axes: Axes, runs: Sequence[Shown]) -> None:
-    """Draw V' and its bound over time; bounds far beyond all rates are left out."""
+    """Draw V' and its bound over time; bounds beyond FAR times all rates are left out."""
     axes.set_ylabel(rf"${V_DOT.symbol}$ [{SUM}/s]")
     runs = [run for run in runs if run.has("V_dot")]
     for run in runs:
@@ -142,7 +144,7 @@ def _rate(axes: Axes, runs: Sequence[Shown]) -> None:
 
 
 def _compress(axes: Axes, settled: float) -> None:
-    """A vertical axis that is logarithmic beyond the settled values, with ticks at some decades."""
+    """Make the vertical axis logarithmic beyond the size `settled`, with ticks at some decades."""
     threshold = 10.0 ** math.ceil(math.log10(settled))
     axes.set_yscale("symlog", linthresh=threshold, linscale=2.0)
     axes.yaxis.set_major_locator(_Decades(threshold))
@@ -158,7 +160,10 @@ class _Decades(Locator):
         return self.tick_values(*self.axis.get_view_interval())  # type: ignore[union-attr]
 
     def tick_values(self, vmin: float, vmax: float) -> list[float]:
-        """Ticks between two values."""
+        """Ticks between two values, the ends of the axis: 0 and decades of both signs.
+
+        At most SIDE_TICKS decades of a sign are taken, at equal distances.
+        """
         largest = max(abs(vmin), abs(vmax), 10.0**self.first)
         count = math.floor(math.log10(largest)) - self.first + 1
         steps = range(self.first, self.first + count, -(-count // SIDE_TICKS))
@@ -174,7 +179,10 @@ def _settled_size(run: Shown, name: str) -> float:
 
 
 def _shares(axes: Axes, run: Shown) -> list[PolyCollection]:
-    """V's terms, stacked, each as its part of V; the layers."""
+    """Draw V's terms, stacked, each as its part of V (0 to 1), and return the layers for a legend.
+
+    Where V is 0, all parts are 0.
+    """
     time = run.recording["time"]
     terms = np.stack([_means(run.signal(term.name)) for term in TERMS])
     total = terms.sum(axis=0)
@@ -189,4 +197,5 @@ def _means(values: Vector) -> Vector:
     """Means of neighbours in values (n,), at most POINTS of them."""
     width = -(-len(values) // POINTS)
     starts = np.arange(0, len(values), width)
+    # The last group may be smaller.
     return np.asarray(np.add.reduceat(values, starts) / np.diff([*starts, len(values)]))

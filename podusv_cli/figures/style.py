@@ -61,7 +61,7 @@ class Look:
     style: Style = STYLES["podusv"]
 
     def given_to(self, figure: Figure) -> Figure:
-        """The figure in this size, where one is given."""
+        """The figure, resized if it is a page and the look has a size of its own."""
         width = self.width or self.style.widths[self.columns]
         if isinstance(figure, Page) and (width != figure.get_figwidth() or self.height):
             figure.resize(width, self.height or figure.get_figheight())
@@ -94,9 +94,9 @@ def remark(axes: Axes, text: str) -> None:
 
 
 def legend(figure: Page, thin: str = "", held: Mapping[str, str] = MappingProxyType({})) -> None:
-    """Every name in any panel once, above all panels; `thin` says what the thin curves are.
+    """Put every name in any panel once into a legend above all panels.
 
-    Below all panels, the `constants` that have no panel.
+    `thin` says what the thin curves are. `held` are the `constants` without a panel, below.
     """
     handles = {
         label: handle
@@ -120,6 +120,7 @@ def image(figure: Figure, form: str) -> bytes:
     canvas = FigureCanvasAgg(figure)
     canvas.draw()  # type: ignore[no-untyped-call]
     drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")  # type: ignore[no-untyped-call]
+    # A palette makes the file a third; the same figure gives the same bytes.
     few = drawn.quantize(COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     palette = np.array(few.getpalette() or [], int).reshape(-1, 3)
     palette[np.asarray(few)[0, 0]] = 255  # the ground, else a mean with the palest edges

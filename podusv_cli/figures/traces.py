@@ -25,10 +25,11 @@ NEXT = ("x_e", "y_e")  # which follow from the log
 
 
 def traces(runs: Sequence[Shown], names: Sequence[str] = ()) -> dict[str, Any]:
-    """The scalar signals that a run has, with meaning, symbol, unit and scale; {} where is none.
+    """The scalar signals of the runs with meaning, symbol, unit and scale; {} where there is none.
 
-    Every curve is over the whole run, thinned by `thin_trace` and encoded by `encode_trace`; null
-    where a run lacks the signal. `first` is how many signals readers look at first.
+    `names` chooses them; by default those that readers look at first, and some more. Every curve is
+    over the whole run, thinned by `thin_trace` and encoded by `encode_trace`; null where a run
+    lacks the signal. `first` is how many signals readers look at first.
     """
     runs = [run for run in runs if len(run.recording["time"])]
     shown = names or _scalar(runs)[: max(MOST, CURVES // max(1, len(runs)))]
@@ -80,7 +81,10 @@ def _describe_signal(runs: Sequence[Shown], name: str) -> dict[str, Any]:
 
 
 def _scale(runs: Sequence[Shown], name: str) -> dict[str, Any]:
-    """Where the axis is logarithmic, as in figures: beyond `linear`, of a `floor` only there."""
+    """The scale of a signal's axis: linear up to `linear` (None: all of it), logarithmic beyond.
+
+    With `floor` it begins there, as an axis of distances does.
+    """
     if name == DISTANCE:
         return {"linear": smallest_distance(runs), "floor": True}
     numbers = np.concatenate([run.signal(name) for run in scaling(runs)], dtype=float)
@@ -100,20 +104,22 @@ def thin_trace(numbers: Vector) -> tuple[Vector, Vector]:
         return numbers, np.empty(0)
     edges = np.linspace(0, len(numbers), PIECES + 1).round().astype(int)
     first, sizes = edges[:-1, None], np.diff(edges)[:, None]
+    # Pieces differ by one in length; the shorter ones repeat their last number.
     rows = np.minimum(first + np.arange(sizes.max()), edges[1:, None] - 1)  # the last one again
     pieces = numbers[rows]
     good = np.isfinite(pieces)
     least = np.where(good, pieces, np.inf).argmin(axis=1)
     most = np.where(good, pieces, -np.inf).argmax(axis=1)
     within = np.sort(np.stack((least, most), axis=1), axis=1)
+    # A piece without a finite number keeps its first.
     within[~good.any(axis=1)] = 0
     return numbers[(first + within).ravel()], (255 * within // sizes).ravel()
 
 
 def encode_trace(numbers: Vector, places: Vector) -> dict[str, str]:
-    """In base 64: four bytes a number, the least significant first, and a byte a place.
+    """The arrays (n,) in base 64: four bytes a number, the least significant first, a byte a place.
 
-    What is beyond any number of four bytes is none.
+    A number beyond the range of four bytes is NaN. A page decodes both.
     """
     with np.errstate(over="ignore"):
         small = np.asarray(numbers, dtype="<f4")

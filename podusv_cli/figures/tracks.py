@@ -37,7 +37,10 @@ class Target:
         return not self.runs[0].about.trial
 
     def track(self, span: Span = (0.0, np.inf)) -> tuple[Vector, Vector]:
-        """East and north [m] during a time [s]; all legs of a path, the track of a trial."""
+        """East and north (n,) [m] of the target during a time [s].
+
+        That is all legs of a path, and the track of the run in a trial.
+        """
         if self.in_sight and not self.is_ahead:
             north, east = np.array(self.runs[0].about.waypoints).T
             return east, north
@@ -71,15 +74,17 @@ def _target(group: Sequence[Shown], *, only: bool) -> Target:
 
 
 def bounds(runs: Sequence[Shown], room: float = 0.0) -> tuple[Span, Span]:
-    """Limits east and north [m] of a map of the targets and of the runs that finished, if any.
+    """Limits (east, north) [m] of a map of the targets and of the runs that finished, if any.
 
-    Where none finished, targets alone. At least `room` [m] is left around them.
+    Where none finished, targets and starts alone. At least `room` [m] is left around them.
     """
     pairs = [target.track() for target in targets(runs)]
     pairs += [(run.recording["y"], run.recording["x"]) for run in runs if run.whole]
+    # The start of every run is on the map.
     pairs += [(run.recording["y"][:1], run.recording["x"][:1]) for run in runs]
     corners = ([(part.min(), part.max()) for part in parts] for parts in zip(*pairs, strict=True))
     east, north = (np.ravel(extremes) for extremes in corners)
+    # 6 % of the larger extent; targets at one place still get a map of some size.
     margin = max(0.06 * max(float(np.ptp(east)), float(np.ptp(north)), 1.0), room)
     return (
         (float(east.min()) - margin, float(east.max()) + margin),

@@ -44,7 +44,10 @@ WAYPOINT: dict[str, Any] = {**MARK, "marker": "s", "markersize": 5.0, "markerfac
 
 
 def enlargement(runs: Sequence[Shown]) -> float:
-    """How many times larger than life hulls must be drawn to be seen on a map of the whole run."""
+    """How many times larger than life hulls must be drawn to be seen on a map of the whole run.
+
+    A hull is then about a twentieth of the targets' extents.
+    """
     tracks = [target.track() for target in targets(runs)]
     spread = max(float(np.ptp(east) + np.ptp(north)) for east, north in tracks)
     return max(1.0, round(0.05 * spread / max(run.length for run in runs)))
@@ -60,7 +63,7 @@ def map_axes(axes: Axes, east: Span, north: Span) -> None:
 
 
 def hull_of(run: Shown, t: float, scale: float) -> Vector:
-    """Outline of a run's vessel at a time [s], `scale` times as large: columns east, north [m]."""
+    """Outline (5, 2) of a run's vessel at a time [s], `scale` times as large: east, north [m]."""
     x, y, psi = (run.at(t, name) for name in ("x", "y", "psi"))
     ahead, right = (HULL * (scale * run.length, scale * run.about.beam)).T
     north = x + ahead * np.cos(psi) - right * np.sin(psi)
@@ -109,13 +112,15 @@ def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
 def _sheet(
     asides: int, distances: bool, columns: int, shape: float
 ) -> tuple[Page, Axes, list[Axes], Axes | None]:
-    """A figure with a map that is so many times as wide as high, close-ups, and distances.
+    """A figure with a map, `asides` close-ups, and a panel of distances or None.
 
-    The map is as wide as its shape asks for: beside the rest, or, where it is wide, above it.
+    `shape` is the map's width over its height: it stands beside the rest, or, where it is wide,
+    above it. `columns` is the width in columns of a page.
     """
     high = columns == 2 and shape < WIDE_MAP
     if high:
         width = float(np.clip(HIGH_MAP * shape, *MAP_WIDTHS))
+        # Inches are left for titles, labels of axes and the legend: 0.9 in height, 0.6 in width.
         figure = new_figure(columns, HIGH_MAP + 0.9)
         rest = (WIDTHS[columns] - width - 0.6) / asides
         cells = figure.add_gridspec(
@@ -129,6 +134,8 @@ def _sheet(
     else:
         height = float(np.clip((WIDTHS[columns] - 0.6) / shape, 1.2, WIDTHS[columns]))
         beside = distances and columns == 2
+        # Close-ups get 1.6 inches in height, distances 1.1; each row has 0.6 for its title and
+        # labels.
         rows = [height, 1.6, 1.1] if distances and not beside else [height, 1.6]
         figure = new_figure(columns, sum(rows) + 0.6 * len(rows))
         cells = figure.add_gridspec(
@@ -144,7 +151,7 @@ def _sheet(
 
 
 def distances(axes: Axes, runs: Sequence[Shown]) -> None:
-    """How far each run is from the first at the same time, on a logarithmic axis.
+    """Draw how far each run is from the first at the same time, on a logarithmic axis.
 
     On a path that is followed, how far it is from the path; a run alone, from its target.
     """
@@ -168,14 +175,14 @@ def distances(axes: Axes, runs: Sequence[Shown]) -> None:
 
 
 def _own_distance(runs: Sequence[Shown]) -> str:
-    """The signal that tells how far each run is from what it follows, "" for none."""
+    """The signal of how far each run is from what it follows, "" for none."""
     if all(run.about.follows and run.has(DEVIATION) for run in runs):
         return DEVIATION
     return "z_e" if len(runs) == 1 and runs[0].has("z_e") else ""
 
 
 def _between(first: Shown, run: Shown) -> tuple[Vector, Vector]:
-    """Time, and a run's distance from the first one at the same time [m]."""
+    """Time (n,) [s], and a run's distance (n,) [m] from the first one at the same time."""
     t, _ = run.during("x", (0.0, first.end))
     times = first.recording["time"]
     apart = [
@@ -221,7 +228,7 @@ def _draw_hull(axes: Axes, run: Shown, t: float, scale: float) -> None:
 
 
 def _mark_ends(axes: Axes, runs: Sequence[Shown], east: Span, north: Span) -> None:
-    """An x at the last place within the map of every run that did not finish."""
+    """An x at the last place of every run that did not finish, within the map (east, north) [m]."""
     for run in (run for run in runs if not run.whole):
         y, x = run.recording["y"], run.recording["x"]
         inside = (y > east[0]) & (y < east[1]) & (x > north[0]) & (x < north[1])
@@ -247,7 +254,7 @@ class View:
 
 
 def views(runs: Sequence[Shown]) -> list[View]:
-    """Where runs that finished are farthest apart, if anywhere, and the end that all of them have.
+    """The close-ups: where finished runs are farthest apart, if anywhere, and their end.
 
     Hulls are shown at one and the same time. Of several targets, the first with its runs. On a path
     that is followed, runs are at other places at one time: shown is the largest deviation from it.
@@ -264,10 +271,14 @@ def views(runs: Sequence[Shown]) -> list[View]:
 
 
 def _at_once(name: str, t: float, runs: Sequence[Shown], target: Target, middle: Vector) -> View:
-    """The runs at a time, with the tracks before and after it."""
+    """The view of the runs at a time `t` [s], with the tracks around it.
+
+    `middle` (2,) is the view's centre: east and north [m].
+    """
     last = min(run.counts_to for run in runs)
     span = t - LAST_PART * last, min(t + LAST_PART * last, last)
     at = np.array([[run.at(t, name) for name in ("y", "x")] for run in runs])
+    # All hulls are in the view, with some room, unless they are too far apart.
     away = 1.3 * float(np.max(np.hypot(*(at - middle).T)))
     length = max(run.length for run in runs)
     reach = min(max(NEAREST * length, away), FARTHEST * length)
@@ -275,19 +286,20 @@ def _at_once(name: str, t: float, runs: Sequence[Shown], target: Target, middle:
 
 
 def _deviation(runs: Sequence[Shown], target: Target, last: float) -> View:
-    """Where a run is farthest from its path, once the approach is over."""
+    """The view where a run is farthest from its path, after the approach and until `last` [s]."""
     errors = [np.where(_is_on_leg(run, last), np.abs(run.signal(DEVIATION)), 0.0) for run in runs]
     largest = int(np.argmax([error.max() for error in errors]))
     worst, error = runs[largest], errors[largest]
     instant = float(worst.recording["time"][np.argmax(error)])
     middle = np.array([worst.at(instant, name) for name in ("y", "x")])
+    # The largest deviation fills two thirds of the view's half width, unless hulls set the size.
     reach = min(max(NEAREST * worst.length, 1.5 * float(error.max())), FARTHEST * worst.length)
     name = "farthest from the path"
     return View(name, instant, runs, (0.0, np.inf), [worst], target, middle, reach)
 
 
 def _is_on_leg(run: Shown, last: float) -> npt.NDArray[np.bool_]:
-    """At which instants (rows,), after the approach, the run has come to its leg.
+    """At which instants (rows,), after the approach and until `last` [s], the run is on its leg.
 
     At a change of legs the error begins anew, with up to the radius of acceptance. That is the
     corner's until the vessel crosses the leg, or is as near to it as on half of the leg.
@@ -303,7 +315,10 @@ def _is_on_leg(run: Shown, last: float) -> npt.NDArray[np.bool_]:
 
 
 def _farthest_apart(runs: Sequence[Shown], target: Target, last: float) -> list[View]:
-    """The view of the runs when they fill the largest box; none where that is in the last part."""
+    """The view of the runs when they fill the largest box, up to `last` [s].
+
+    Empty if that is at the end, which has a view of its own.
+    """
     times = np.linspace(min(run.start for run in runs), last, INSTANTS)
     logs = [run.recording for run in runs]
     tracks = np.array(
@@ -318,7 +333,10 @@ def _farthest_apart(runs: Sequence[Shown], target: Target, last: float) -> list[
 
 
 def close_up(axes: Axes, view: View, among: Sequence[Shown]) -> None:
-    """Tracks around the time of the view, hulls to scale."""
+    """Draw tracks around the time of the view, with hulls to scale.
+
+    `among` are all runs of the figure: their order gives the widths of tracks.
+    """
     _draw_tracks(axes, [view.target], view.tracks, view.span, among)
     for run in view.hulls:
         _draw_hull(axes, run, view.t, 1.0)
@@ -334,7 +352,10 @@ def close_up(axes: Axes, view: View, among: Sequence[Shown]) -> None:
 def _draw_tracks(
     axes: Axes, ahead: Sequence[Target], shown: Sequence[Shown], span: Span, among: Sequence[Shown]
 ) -> None:
-    """Tracks of targets and runs during a time [s]; of equal ones, the first is the broadest."""
+    """Draw tracks of targets and runs during `span` [s]; of equal ones, the first is the broadest.
+
+    `shown` are the runs to draw. Widths go by their place `among` all runs, as in other views.
+    """
     for target in (target for target in ahead if target.in_sight):
         axes.plot(*target.track(span), **target.line_style)
     widths = np.linspace(*BROAD, len(among)) if len(among) > 1 else BROAD[1:]

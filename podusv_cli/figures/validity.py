@@ -49,7 +49,7 @@ def validity(runs: Sequence[Shown], columns: int) -> Figure:
 
 
 def _sway(axes: Axes, runs: Sequence[Shown]) -> None:
-    """Draw sway, and its bound from the start of each window on."""
+    """Draw sway [m/s], and its bound from the start of each window to the end of the run."""
     draw_signal(axes, runs, "v")
     for run in runs:
         end = run.end

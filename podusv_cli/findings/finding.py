@@ -24,7 +24,7 @@ PACKAGES = ("findings", *(f"components.{section}s" for section in BASES))
 def finding_kinds(plugins: Plugins = ()) -> dict[str, FindingKind]:
     """Every kind of finding by code, in the order of the scenario's sections.
 
-    Those of these plug-ins are among them.
+    Those of these plug-ins are among them. Raises LawError for one about an unknown section.
     """
     by_code: dict[str, FindingKind] = {}
     for package in PACKAGES:
@@ -69,8 +69,12 @@ def postflight(scenario: Scenario, log: Recording) -> list[Finding]:
 
 
 def _findings(when: str, scenario: Scenario, *seen: object) -> list[Finding]:
-    """What is found before or after a run; `seen` is what the findings of that time look at."""
+    """What is found before or after a run, but what the scenario silences.
+
+    `seen` is what findings of that time look at: a case, or a scenario and its log.
+    """
     known = finding_kinds(scenario.plugged).items()
     kinds = [kind for code, kind in known if kind.when == when and code not in scenario.silence]
+    # A diverged run has numbers that overflow.
     with np.errstate(all="ignore"):
         return [finding for kind in kinds for finding in kind.findings(scenario.controller, *seen)]

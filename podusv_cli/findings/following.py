@@ -35,10 +35,11 @@ def _lengths(path: Path) -> Vector:
     remedy="take a smaller acceptance radius, or fewer waypoints",
 )
 def short_leg(case: Case) -> Sentences:
-    """The circles of a leg's two waypoints overlap."""
+    """The circles of acceptance of a leg's two waypoints overlap."""
     path = case.scenario.path
     if not path.circles():
         return
+    # All circles of a path have one radius.
     lengths, radius = _lengths(path), path.circles()[0][2]
     short = np.flatnonzero(lengths < ROOM * radius)
     if short.size:
@@ -68,7 +69,9 @@ def legs_too_long(case: Case) -> Sentences:
         return
     start, duration = scenario.start, scenario.simulation.duration
     hops = np.hypot(*np.diff(np.vstack([(start.x, start.y), circles[:, :2]]), axis=0).T)
+    # The start has no circle.
     radii, speed = np.append(0.0, circles[:, 2]), float(case.reference.speed.max())
+    # A leg is over once the vessel is in its circle; overlapping circles leave no way between.
     if np.maximum(hops - radii[:-1] - radii[1:], 0.0).sum() > speed * duration:
         whole = float(hops.sum()) / speed
         yield (
@@ -120,7 +123,7 @@ def station_not_kept(scenario: Scenario, log: Recording) -> Sentences:
 
 
 def _late(missed: bool) -> str:
-    """What a law that is able to arrive lacks."""
+    """What a law that is able to arrive lacks; `missed` where it is past the end of its leg."""
     if missed:
         return (
             "it is past the end of that leg: take a larger path.acceptance, or path.switch: passed"
@@ -129,7 +132,10 @@ def _late(missed: bool) -> str:
 
 
 def _unable(scenario: Scenario) -> list[str]:
-    """Speed and moment that keep a law from arriving: its own, or the hull's."""
+    """Why a law cannot arrive, in sentences: its own limits, or the hull's speed.
+
+    Empty if it can.
+    """
     facts, law = scenario.facts, scenario.controller
     speed = median(reference(scenario).speed)
     own = [

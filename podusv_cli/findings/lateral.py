@@ -1,4 +1,4 @@
-"""Findings about laws that steer the velocity: sway answers yaw too much, or not as told."""
+"""Findings about laws that steer the velocity: sway answers yaw too much, or not as assumed."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ Growth = Callable[[Any, Case, float, float], float]
 
 
 def _inverting(law: Any, case: Case, V: float, v: float) -> float:
-    """Growth [1/s] of a law that inverts the answer."""
+    """Growth [1/s] of a law that inverts the answer, at speed V and sway v [m/s]; < 0 is stable."""
     loop = velocity_vector_loop(law, case.scenario.vessel, V, v, sway_share(case.scenario))
     return float(np.linalg.eigvals(loop).real.max())
 
 
 def _weighing(law: Any, case: Case, V: float, v: float) -> float:
-    """Growth [1/s] of a law that weighs the answer."""
+    """Growth [1/s] of a law that weighs the answer, at speed V and sway v [m/s]; < 0 is stable."""
     at = momentum_vector_gains(law, case.scenario.vessel, V, v)
     return growth(momentum_vector_polynomial(*at))
 

@@ -33,9 +33,13 @@ LOOPS: dict[Cause, tuple[str, str, str]] = {
 
 
 def _too_fast(case: Case, cause: Cause) -> Sentences:
-    """RK4 is unstable at this step because of a velocity loop with this cause."""
+    """A sentence for each axis on which RK4 is unstable because of a loop with this cause.
+
+    Looked at are the velocity at the start and the usual one.
+    """
     grid = case.plan.grid
     reported: set[str] = set()
+    # Of a sampled law, RK4 sees a constant demand; `_sampled_too_fast` looks at it.
     for nu in () if grid.hold_every else (case.first_velocity, case.reference.working):
         for loop in loops(case.scenario, nu, cause):
             if loop.axis not in reported and rk4_growth(loop, grid.step) > UNSTABLE:
@@ -49,6 +53,7 @@ def _too_fast(case: Case, cause: Cause) -> Sentences:
 
 def _largest_step(loop: Loop) -> float:
     """The largest step [s] up to which RK4 is stable, by bisection."""
+    # RK4 is stable up to 2.8 over the fastest rate, so 4 is beyond.
     low, high = 0.0, 4.0 / loop.fastest
     for _ in range(40):
         middle = 0.5 * (low + high)
@@ -101,7 +106,10 @@ sampled_adaptation, sampled_derivative, sampled_loop = map(_sampling_finding, LO
 
 
 def _margin(case: Case) -> float:
-    """The delay [s] that the loop bears; NaN where it has no steady motion, or is unstable."""
+    """The delay margin of all demands [s].
+
+    NaN where there is no steady motion, or it is unstable.
+    """
     try:
         compiled = case.scenario.simulation.compiled
         margins = loop_margins(case.plan.loop, case.plan.grid, compiled=compiled)
@@ -124,6 +132,7 @@ def delayed_loop(case: Case) -> Sentences:
     Where the path has no steady motion, the velocity loops alone are looked at.
     """
     delay = case.scenario.actuator.delay()
+    # NaN where there is no steady motion: then no comparison with it is true.
     whole = _margin(case) if delay else math.nan
     if delay > whole:
         yield (
@@ -160,6 +169,7 @@ def stiff_start(case: Case) -> Sentences:
     if SATURATION in scenario.actuator.signals or scenario.control.period:
         return
     for loop in loops(scenario, case.first_velocity):
+        # Only loops whose bound adapts have such an error.
         error = case.first_signals[loop.bound.error] if loop.bound else math.nan
         stiff_anyway = rk4_growth(loop, step) > UNSTABLE  # a finding of its own
         if not loop.bound or not math.isfinite(error) or stiff_anyway:

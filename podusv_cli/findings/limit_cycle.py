@@ -30,10 +30,12 @@ SPREAD = 2  # harmonics to either side of a line that Hann's window and a broken
 def limit_cycle(scenario: Scenario, log: Recording) -> Sentences:
     """The distance along or across the target's course swings at one frequency, and goes on."""
     late = steady_rows(scenario, log)
+    # Fewer rows than eight a period show no frequency.
     if log.status != "finished" or late.sum() < 8 * PERIODS or not scenario.controller.aims():
         return
     time, x, y = (log[name][late] for name in ("time", "x", "y"))
     errors = _rotate_to_course(x - log["x_d"][late], y - log["y_d"][late], _course(log, late))
+    # The direction in which it swings more.
     name, swing = max(
         zip(("along", "across"), errors, strict=True), key=lambda part: float(part[1].std())
     )
@@ -44,6 +46,7 @@ def limit_cycle(scenario: Scenario, log: Recording) -> Sentences:
     pure = at >= PERIODS and power[near].sum() >= PURE * power.sum()
     visible = size >= VISIBLE * scenario.vessel.length
     if pure and visible and size >= DECAY * earlier and not _is_forced(scenario, log, late, near):
+        # Two crossings of the mean a period, more exact than the harmonic's frequency.
         crossings = time[np.flatnonzero(np.diff(np.signbit(swing - swing.mean())))]
         period = 2.0 * (crossings[-1] - crossings[0]) / (len(crossings) - 1)
         yield (
@@ -55,11 +58,12 @@ def limit_cycle(scenario: Scenario, log: Recording) -> Sentences:
 
 
 def _is_forced(scenario: Scenario, log: Recording, rows: Mask, near: slice) -> bool:
-    """Whether loads, or turns of the target, are large enough at these harmonics for the swing.
+    """Whether loads, or turns of the target, at these harmonics are large enough for the swing.
 
-    Mean squares of b/sqrt(m), for loads b and inertias m of the three axes, are compared with those
-    of sqrt(m) a for the accelerations a: a free hull would answer the loads with just these.
-    Loads that follow from the swing itself, as in a current, are far smaller.
+    `rows` (n,) are those of the steady window, `near` the harmonics around the swing's. Mean
+    squares of b/sqrt(m), for loads b and inertias m of the three axes, are compared with those of
+    sqrt(m) a for the accelerations a: a free hull would answer the loads with just these. Loads
+    that follow from the swing itself, as in a current, are far smaller.
     """
     hull, time = scenario.vessel, log["time"][rows]
 

@@ -35,6 +35,7 @@ def warn_of_saturation(scenario: Scenario, log: Recording) -> Sentences:
     if "saturated" not in log:
         return
     law = scenario.controller
+    # A law that knows the loads that act keeps its memory from winding up.
     winds_up = bool(law.slots()) and not law.wants_loads()
     whole = winds_up or log.status != "finished"
     rows, span = (counted_rows, "run") if whole else (steady_rows, "steady window")
@@ -49,7 +50,10 @@ def warn_of_saturation(scenario: Scenario, log: Recording) -> Sentences:
 
 
 def _windup(scenario: Scenario) -> str:
-    """What to do about a demand at its limits, which depends on the law's memory."""
+    """What to do about a demand at its limits, as the end of a sentence.
+
+    It depends on whether the law has a memory that winds up.
+    """
     law, switching = scenario.controller, _switching(scenario)
     if switching:
         return (
@@ -67,7 +71,7 @@ def _windup(scenario: Scenario) -> str:
 
 
 def _switching(scenario: Scenario) -> list[str]:
-    """What makes a demand swing that is not limited for long otherwise."""
+    """What can make a demand swing from limit to limit: delay, noise, a control period."""
     delay, period = scenario.actuator.delay(), scenario.control.period
     return [
         *([f"a command delay of {delay:g} s"] if delay else []),
@@ -104,9 +108,10 @@ def outside_envelope(scenario: Scenario, log: Recording) -> Sentences:
 
 
 def _through_water(log: Recording) -> tuple[Vector, Vector, Vector]:
-    """u, v [m/s] and r [rad/s] of the hull beside the water around it."""
+    """u, v [m/s] and r [rad/s] of the hull relative to the water around it; each (rows,)."""
     u, v = log["u"], log["v"]
     if "V_c" in log:
+        # The current V_c [m/s] runs towards beta_c [rad]; here are its components along u and v.
         u = u - log["V_c"] * np.cos(log["beta_c"] - log["psi"])
         v = v - log["V_c"] * np.sin(log["beta_c"] - log["psi"])
     return u, v, log["r"]
@@ -122,12 +127,13 @@ def _through_water(log: Recording) -> tuple[Vector, Vector, Vector]:
     remedy="give the filter the noise that sensors have, with what waves add to it",
 )
 def inconsistent_filter(scenario: Scenario, log: Recording) -> Sentences:
-    """The estimator's own measure of a sensor's noise says that it is told wrong."""
+    """The estimator's own measure of a sensor's noise says that its number is wrong."""
     late = np.flatnonzero(steady_rows(scenario, log))
     if "nis_sum" not in log or not late.size:
         return
     from scipy.special import chdtr, chdtrc  # slow to import
 
+    # Both are sums since the start: the window's share is last less first.
     squares, counts = (
         np.ptp(log[name][late[[0, -1]]], axis=0) for name in ("nis_sum", "nis_count")
     )
@@ -185,6 +191,7 @@ def moves_away(scenario: Scenario, log: Recording) -> Sentences:
 def never_settles(scenario: Scenario, log: Recording) -> Sentences:
     """The run ends without having come to its target; `moves-away` says so of a worse one."""
     late = steady_rows(scenario, log)
+    # `moves_away` has said worse of this run already.
     if log.status != "finished" or not late.any() or any(moves_away.search(scenario, log)):
         return
     approach, radius = scenario.controller.approach(), scenario.metrics.settling_radius
@@ -203,17 +210,22 @@ def never_settles(scenario: Scenario, log: Recording) -> Sentences:
 
 
 def _arrives(errors: Vector, fraction: float, radius: float) -> bool:
-    """Whether errors (rows,) [m] that fall as in this fraction of a run reach the radius [m].
+    """Whether the vessel reaches the radius [m] in a second run as long, if it goes on like this.
 
-    In as long a run.
+    `errors` (rows,) [m] are those of the last `fraction` of the run.
     """
     half = -(-len(errors) // 2)
     earlier, later = float(errors[:half].mean()), float(errors[-half:].mean())
+    # The fall between the middles of both halves, half the window apart, as a rate per run.
     return (earlier - later) / (0.5 * fraction) > later - radius
 
 
 def _reversals(part: dict[str, Vector], turned: float) -> str | None:
-    """What a zig-zag has not come to; `turned` is its change of heading so far [rad]."""
+    """What a zig-zag lacks of its REVERSALS, in words, or None.
+
+    `part` has its signals (n,) since it began, by name; `turned` is the change of heading so far
+    [rad].
+    """
     count = int((np.diff(np.sign(part["delta_s"])) != 0.0).sum())
     if count >= REVERSALS:
         return None
@@ -224,13 +236,17 @@ def _reversals(part: dict[str, Vector], turned: float) -> str | None:
 
 
 def _turn(part: dict[str, Vector], turned: float) -> str | None:
-    """What a turning circle has not come to; `turned` is its change of heading [rad]."""
+    """What a turning circle has not come to, or None; `turned` is its change of heading [rad]."""
     degrees = f"the circle turns by {np.degrees(turned):.0f} deg, and its diameter needs 180"
     return degrees if turned < np.pi else None
 
 
 def _way(part: dict[str, Vector], turned: float) -> str | None:
-    """What a stopping trial has not come to; `part` has its signals since it began."""
+    """What a stopping trial has not come to, in words, or None.
+
+    `part` has its signals (n,) since it began, by name. `turned` is not used: the three such
+    functions are called alike.
+    """
     if part["u"][0] <= 0.0:
         return "the hull does not go ahead when it is to stop; give it more speed"
     slowest = float(part["u"].min())

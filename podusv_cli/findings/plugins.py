@@ -34,7 +34,7 @@ def unkept_module(case: Case) -> Sentences:
 
 
 def _imports_in(text: str) -> Iterator[str]:
-    """The modules that a text names in its imports, with the packages that they are in."""
+    """The top packages that a text names in its imports; relative imports are left out."""
     for node in ast.walk(ast.parse(text)):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
         if isinstance(node, ast.ImportFrom) and node.module and not node.level:

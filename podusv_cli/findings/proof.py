@@ -16,6 +16,7 @@ def argument(scenario: Scenario) -> str:
     """
     matrix = scenario.actuator.input_matrix()
     rank = scenario.actuator.input_rank()
+    # Adding 0.0 turns -0.0 into 0.
     rows = ", ".join("[" + ", ".join(f"{x + 0.0:.4g}" for x in row) + "]" for row in matrix)
     demands = ", ".join(("tau_u", "tau_r", "tau_v")[: matrix.shape[1]])
     sway = "its sway row is zero (Y_p = 0)" if not matrix[1].any() else "sway comes with the others"

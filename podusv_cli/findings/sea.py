@@ -112,6 +112,7 @@ def estimator_noise(case: Case) -> Sentences:
     wrong = set[str]()  # sensors; one sentence each
     of = [name for name, places in SENSORS.items() for _ in range(places.start, places.stop)]
     for (key, sigma), noise, state, sensor in zip(assumed, each, STATE, of, strict=True):
+        # With waves, a sigma above the sensor's noise may be right.
         far = sigma < noise / FAR or (sigma > FAR * noise and not waves)
         if key and noise > 0.0 and far and sensor not in wrong:
             wrong.add(sensor)
@@ -153,6 +154,7 @@ def steep_waves(case: Case) -> Sentences:
     """Waves break from a seventh of their length on: g T^2/(2 pi)/7 in deep water."""
     for key, part in case.scenario.disturbances().items():
         height, omega = part.sea()
+        # A disturbance without waves has height 0, and any peak.
         length = 2.0 * math.pi * GRAVITY / omega**2
         if height > BREAKS * length:
             yield At(

@@ -20,7 +20,10 @@ AGILE = 0.8  # of the path's speed over the length, the least gain of the headin
 
 
 def other_numbers(law: Controller, facts: Facts) -> dict[str, tuple[float, float, str]]:
-    """U, N_m and k_psi that are far from the rule's: number, the rule's, and why it matters."""
+    """Given values of U, N_m and k_psi that are far from the default rule.
+
+    By name: (number, the rule's number, why it matters). `facts` are of hull and actuator.
+    """
     own = [name for name in USUAL if name in law.rules and name not in law.by_rule]
     far: dict[str, tuple[float, float, str]] = {}
     with suppress(SizingError):  # where nothing follows, nothing is far from it
@@ -32,9 +35,11 @@ def other_numbers(law: Controller, facts: Facts) -> dict[str, tuple[float, float
 
 
 def _why(name: str, number: float, rule: float, facts: Facts) -> str:
-    """What comes of a number that is too small or too large; else empty."""
+    """What comes of a `number` that is far too small or large beside the `rule`; else empty."""
     low, high = USUAL[name]
     if name == "k_psi" and facts.T_r > 0.0:
+        # The bound on k_psi [1/s] follows from the loop's delay T_r [s]; divided by the rule, as
+        # USUAL is.
         high = BEARABLE * facts.c / facts.T_r / rule
     consequences = {
         "U": ("the law never asks for the speed that there is", "surge is always limited"),

@@ -17,9 +17,10 @@ def counted_rows(scenario: Scenario, log: Recording) -> Mask:
 
 
 def steady_rows(scenario: Scenario, log: Recording) -> Mask:
-    """The counted rows in the steady window: of the way where a path has an end, else of the time.
+    """The counted rows (n,) in the steady window.
 
-    A log that does not come so far on its path has the last part of the time.
+    The window is the last part of the way where a path has an end, else of the time. A log that
+    does not come so far on its path has the last part of the time.
     """
     share = 1.0 - scenario.metrics.steady_fraction
     first = log.row_at(scenario.passed_by(share))

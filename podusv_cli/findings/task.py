@@ -49,7 +49,10 @@ CONSEQUENCES: dict[str, Callable[[float, Case], str]] = {
 
 
 def path_breaks(case: Case, what: str) -> Sentences:
-    """Where the target's position, velocity or acceleration jumps within the run."""
+    """Sentences on where the target's `what` jumps within the run.
+
+    `what` is position, velocity or acceleration.
+    """
     offset, unit = BREAKS[what]
     fillet = case.scenario.path.fillet_for_law()
     if fillet and what == "velocity":
@@ -63,6 +66,7 @@ def path_breaks(case: Case, what: str) -> Sentences:
     for at in case.scenario.path.breaks():
         if at.what == what and at.time < case.scenario.simulation.duration:
             beside = BESIDE * max(at.time, 1.0)
+            # A moment to either side; relative to the time, as floats are spaced that way.
             before, after = case.scenario.path.targets((at.time - beside, at.time + beside))
             size = float(np.hypot(*(after - before)[offset : offset + 2]))
             meaning = CONSEQUENCES[what](size, case)
@@ -70,7 +74,7 @@ def path_breaks(case: Case, what: str) -> Sentences:
 
 
 def _path_break(code: str, what: str, remedy: str) -> FindingKind:
-    """The finding on a jump of the target's position, velocity or acceleration."""
+    """The finding on a jump of the target's `what`: position, velocity or acceleration."""
     return warn_before_run(
         code,
         about="path",
@@ -104,6 +108,7 @@ def opposite_start(case: Case) -> Sentences:
     if law.wants_heading():
         what, wanted = "heading", target[PSI_D]
     half = abs(abs(math.remainder(start.psi - wanted, 2.0 * math.pi)) - math.pi) < OPPOSITE
+    # A target at rest has no course.
     known = law.wants_heading() or math.hypot(x_dot, y_dot) > STANDING
     if half and not start.r and known and law.aims():
         yield (
@@ -169,6 +174,7 @@ def sway_unstable(case: Case) -> Sentences:
     approach, vessel = case.scenario.controller.approach(), case.scenario.vessel
     if approach is None:
         return
+    # Pointing at the target turns the surge momentum into sway at this rate [kg/s].
     drive = vessel.m11 * approach.gain
     damping, limit = _damping(case, drive)
     speed = median(case.reference.speed)
@@ -202,13 +208,17 @@ def sliding_distance(case: Case, approach: Approach, damping: float) -> float:
 
 
 def _damping(case: Case, drive: float) -> tuple[float, float]:
-    """Sway damping [kg/s] at the steady sway, and the sway [m/s] where growth by `drive` stops."""
+    """Sway damping [kg/s] at the steady sway, and the sway [m/s] where growth stops.
+
+    The growth is by `drive` [kg/s].
+    """
     k, sway = bundle(case.scenario.vessel.constants()), case.reference.steady_sway
     u = median(case.reference.speed)
     at_rest, small = sway_force(u, sway, 0.0, k), 1e-4
     damping = (sway_force(u, sway - small, 0.0, k) - sway_force(u, sway + small, 0.0, k)) / (
         2 * small
     )
+    # Nonlinear damping overtakes the linear drive at some sway; FASTEST if at none.
     growths = np.geomspace(1e-3, FASTEST, 200)
     side = 1.0 if sway >= 0.0 else -1.0
     held = [
@@ -234,6 +244,7 @@ def thrust_short(case: Case) -> Sentences:
     actuator, rounding = case.scenario.actuator, ROUNDING * float(np.abs(seen.demand).max())
     for axis, (what, unit, load) in enumerate(DEMANDED[: len(worst)]):
         demand = seen.demand[worst[axis]]
+        # The pose does not matter to an actuator.
         x = np.concatenate([np.zeros(3), np.nan_to_num(seen.nu[worst[axis]])])
         needed, got = float(demand[axis]), float(actuator.settled(x, demand)[load])
         if got * np.sign(needed) < DELIVERED * abs(needed) - rounding:
@@ -247,7 +258,7 @@ def thrust_short(case: Case) -> Sentences:
 
 
 def _driven_ahead(case: Case, row: int) -> Sentences:
-    """The largest yaw moment comes with more surge force than following takes."""
+    """A sentence where the largest yaw moment, in this row, comes with too much surge force."""
     seen = case.reference
     x = np.concatenate([np.zeros(3), np.nan_to_num(seen.nu[row])])
     needed, moment, *_ = seen.demand[row].tolist()
@@ -271,6 +282,7 @@ def slow_law(case: Case) -> Sentences:
     """The law asks for less speed than the target has."""
     most, speed = case.scenario.controller.most(), median(case.reference.speed)
     if most.speed < speed:
+        # Some laws may exceed U by a small speed near the target.
         nears = f"nears it by {most.creep:g} m/s at most" if most.creep else "never catches up"
         yield (
             f"{most.speed:g} m/s, while the target moves at {speed:.3g} m/s: the law {nears}; take "
@@ -289,6 +301,7 @@ def moment_short(case: Case) -> Sentences:
     """Surge yields to yaw only beyond a moment that the actuator cannot give."""
     moment, actuator = case.scenario.controller.most().moment, case.scenario.actuator
     if math.isfinite(moment):
+        # The settled load (surge, sway, yaw) at rest, without surge.
         got = float(actuator.settled(np.zeros(6), np.array([0.0, moment]))[2])
         if got < ROUNDED * moment:
             yield (

@@ -77,7 +77,10 @@ def _within(number: float, limits: tuple[float, float]) -> bool:
 def _guess_unit(
     number: float, units: tuple[UnitGuess, ...], ratio: float, limits: tuple[float, float]
 ) -> str:
-    """`; in mm it is 4 m?`: the first unit in which the ratio, linear in the number, is usual."""
+    """A question whether `number` was given in one of `units`, and what to write then; else "".
+
+    It is the first unit in which the `ratio`, linear in the number, lies within the usual `limits`.
+    """
     fits = [unit for unit in units if _within(ratio * unit.factor, limits)]
     return (
         f"; was it given in {fits[0].name}? then write {number * fits[0].factor:g}" if fits else ""
@@ -85,7 +88,10 @@ def _guess_unit(
 
 
 def _hull(vessel: Vessel) -> Iterator[tuple[str, str]]:
-    """Key and sentence for the first of the hull's ratios that no hull has."""
+    """Key and sentence for the first of the hull's ratios that no hull has.
+
+    Only the first: a wrong length spoils the others.
+    """
     L, B, m = vessel.length, vessel.beam, vessel.m
     slender, bulk = L / B, m / (WATER * L * B * B)
     radius = math.sqrt(vessel.I_z / m)
@@ -93,6 +99,7 @@ def _hull(vessel: Vessel) -> Iterator[tuple[str, str]]:
         meant = _guess_unit(L, METRES, slender, SLENDER)
         yield "length", f"{L:g} m over a beam of {B:g} m{meant or '; check both, in metres'}"
     elif not _within(bulk, BULK):
+        # Length times beam squared goes with the unit's cube.
         both = [unit for unit in METRES if _within(bulk / unit.factor**3, BULK)]
         scaled = f"; are length and beam in {both[0].name}? write them in metres" if both else ""
         if meant := _guess_unit(m, KILOGRAMS, bulk, BULK):
@@ -109,7 +116,7 @@ def _hull(vessel: Vessel) -> Iterator[tuple[str, str]]:
 
 
 def _noise(case: Case) -> Sentences:
-    """Noise of sensors that show nothing but noise."""
+    """Findings on sensors whose noise hides all that they measure."""
     noise, length = case.scenario.measurement.noise_of_each(), case.scenario.vessel.length
     for key, place, unit in (("heading", 2, "rad"), ("yaw_rate", 5, "rad/s")):
         if noise[place] > TURNED:
@@ -127,7 +134,7 @@ def _noise(case: Case) -> Sentences:
 
 
 def _points(case: Case) -> Sentences:
-    """Points of a way that lie within the hull: degrees, mostly."""
+    """A finding where all points of a way lie within the hull: they are degrees, mostly."""
     points = np.asarray(case.scenario.path.waypoints(), float).reshape(-1, 2)
     length = case.scenario.vessel.length
     if len(points) < 2:
@@ -149,7 +156,7 @@ def _points(case: Case) -> Sentences:
 
 
 def _start(case: Case) -> Sentences:
-    """A start that is nowhere near the target."""
+    """A finding where the start is far from the target, or points are a map's coordinates."""
     start, path, length = case.scenario.start, case.scenario.path, case.scenario.vessel.length
     if not case.scenario.controller.aims():
         return

@@ -53,7 +53,10 @@ def added_mass_sign(case: Case) -> Sentences:
 
 
 def _positive(case: Case, names: Iterable[str]) -> Iterator[tuple[str, Vessel, str, str]]:
-    """Key, vessel, name and value of each positive coefficient, once if both vessels have it."""
+    """Key, vessel, name and value with unit of each positive coefficient among `names`.
+
+    Once if `vessel` and `nominal` have the same.
+    """
     vessels = {"vessel": case.scenario.vessel, "nominal": case.scenario.nominal}
     reported = set[tuple[str, float]]()
     for section, vessel in vessels.items():

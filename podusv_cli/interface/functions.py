@@ -330,7 +330,7 @@ def request(out: Any, force: bool, figures: bool) -> Request:
 
 
 def _open_member(member: Member) -> Run:
-    """A finished run of a comparison's folder."""
+    """The finished run that a `member` of a folder is, with the warnings that it kept."""
     there = member.folder
     assert there is not None  # the members of a folder are finished
     warned = tuple(map(str, json_files.read_as(there.path / "metrics.json", _Noticed).warnings))
@@ -339,7 +339,10 @@ def _open_member(member: Member) -> Run:
 
 
 def _runs_compared(done: comparing.Compared, scenarios: Mapping[str, Scenario]) -> dict[str, Run]:
-    """The runs of a comparison that have a log, by label."""
+    """The runs of a comparison that have a log, by label.
+
+    `done` is the comparison; `scenarios` are those of runs made now.
+    """
     result = done.result
     return {
         run.label: Run(
@@ -375,7 +378,7 @@ def _file(source: Any) -> Path | None:
 def _items(
     given: Sequence[Any], files: Sequence[Path | None], changes: Changes | None, align: str
 ) -> list[Members]:
-    """What is compared: runs, then measured logs; `files` has the path of each given, if any.
+    """What is compared: runs, then measured logs; `files` has the path of each of `given`, if any.
 
     Raises UsageError for changes where only finished runs are given.
     """

@@ -46,12 +46,12 @@ Observe = Callable[[Moment], Any]
 
 
 def demands(task: EpisodeTask) -> Any:
-    """Demands (tau_u [N], tau_r [N m]), maybe tau_v [N], within the actuator's limits."""
+    """The space of actions: (tau_u [N], tau_r [N m]), maybe with tau_v [N], within limits."""
     return Box(-task.limits, task.limits, dtype=np.float64)
 
 
 def observations(task: EpisodeTask) -> Any:
-    """As `OBSERVED`, or as many numbers as the user's own function gives."""
+    """The space of observations: eight numbers, or as many as the user's function gives."""
     most = task.observed_bounds()
     return Box(-most, most, dtype=np.float64)
 
@@ -98,7 +98,10 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
         observe: Observe | None = None,
         limits: Limits | None = None,
     ) -> None:
-        """No episode has begun."""
+        """Check the task and compile its loop; the first episode begins with `reset`.
+
+        Arguments are described at the class.
+        """
         terms = Terms(period, reward, observe, limits)
         self._task = task = EpisodeTask(source, changes, terms)
         EzPickle.__init__(self, task.whole, **terms._asdict())
@@ -119,7 +122,10 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
 
     @with_short_traceback
     def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Vector, Info]:
-        """Begin a run; see the class. `options` change nothing."""
+        """Begin a run; its first observation (numbers,) and its time, {"time": 0.0} [s].
+
+        `seed` is the number of a draw, see the class. `options` change nothing.
+        """
         seed = None if seed is None else self._task.seed(seed)
         super().reset(seed=seed)
         scenario = self._task.draw_scenario(seed, self.np_random)
@@ -148,7 +154,10 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
         return task.observation(self._now), reward, dead, cut, {"time": after.time}
 
     def _reward_grown(self, alive: bool) -> float:
-        """What the metric grew by, with a minus."""
+        """What the metric grew by in this period, with a minus.
+
+        `alive` if all numbers are finite.
+        """
         session, task, before = self.session, self._task, self._gathered
         self._gathered = session.metric(task.metric)
         task.check_reward(self._gathered, alive, session.observe().time)
@@ -179,7 +188,11 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         observe: Observe | None = None,
         limits: Limits | None = None,
     ) -> None:
-        """No episode has begun."""
+        """Check the task and plan marches of several runs; the first episodes begin with `reset`.
+
+        Arguments are described at the class. Raises UsageError where runs cannot march side by
+        side.
+        """
         if whole(changes) >= 0:
             raise UsageError(f"podusv.gym: {changes} stands for `changes`; write count={changes}")
         if (number := whole(count)) < 1:
@@ -192,6 +205,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         self.action_space = batch_space(self.single_action_space, count)
         self.observation_space = batch_space(self.single_observation_space, count)
         self._metrics, grid = task.scenario.probe(), task.scenario.time_grid()
+        # No log: one row, at the start.
         grid = replace(grid, log_every=grid.steps + 1)
         plan = Plan.with_probe(task.scenario.closed_loop(), grid, self._metrics)
         if why := why_alone(plan):
@@ -210,7 +224,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
     ) -> tuple[Vector, Info]:
-        """Begin a run in every environment; `options` change nothing."""
+        """Begin a run in every environment; first observations (environments, numbers) and times.
+
+        `seed` is the first of as many numbers of draws, or one for each. `options` change nothing.
+        """
         seeds = self._seeds(seed)
         super().reset(seed=seeds[0])
         self._marches = self._begin_runs(range(self.num_envs), seeds)
@@ -220,7 +237,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
     def step(self, actions: Vector) -> tuple[Vector, Vector, Flags, Flags, Info]:
         """As `Env.step`, for all environments: arrays with a row, or an entry, for each of them.
 
-        Raises UsageError for demands that are not so many finite numbers each; no run goes on then.
+        `actions` have the shape (environments, demands). Raises UsageError for demands that are not
+        so many finite numbers each; no run goes on then.
         """
         given, ended = (
             self._check_actions(actions).T,
@@ -230,6 +248,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         self._marches = [march for march in self._marches if not march.over]
         dead, cut = np.zeros((2, self.num_envs), bool)
         for march in self._marches:
+            # The demand of this period, in the schedule that stands for the law.
             march.law_table[FIRST : FIRST + len(given)] = given[:, march.places]
             march.advance(march.grid.hold_every)
             going = np.array(march.places)[march.alive]
@@ -243,14 +262,14 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         return seen, rewards, dead, cut, info
 
     def _own_rewards(self, before: Moment) -> Vector:
-        """Rewards (environments,) of the user's function, for runs that went on."""
+        """Rewards (environments,) of the user's function, 0 for runs that did not go on."""
         going = [place for march in self._marches for place in march.places]
         rewards = np.zeros(self.num_envs)
         rewards[going] = self._task.reward_gained(before, self._moment())[going]
         return rewards
 
     def _rewards(self) -> Vector:
-        """What runs gained since they were asked last, (environments,)."""
+        """Rewards (environments,): minus what the metric grew by since the last call."""
         rewards = np.zeros(self.num_envs)
         for march in self._marches:
             gathered = self._metrics.one(self._task.metric, march.gathered_so_far())
@@ -260,13 +279,18 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         return rewards
 
     def _begin_runs(self, places: Sequence[int], seeds: Sequence[int | None]) -> list[SteppedBatch]:
-        """Runs for these environments, in marches."""
+        """Begin runs in the environments `places`, and return the marches they are sorted into.
+
+        A march has as many runs as go side by side. `seeds` are numbers of draws, None for a draw
+        that no study has.
+        """
         groups, advance = [], self._sorter.advance
         assert advance is not None
         for place, seed in zip(places, seeds, strict=True):
             loop = self._task.draw_scenario(seed, self.np_random).closed_loop()
             run = BatchRun.of(place, self._plan.like(loop))
             groups.append(self._sorter.sort_in(run.vectors, run))
+        # Incomplete marches, too.
         groups += self._sorter.rest()
         self._gathered[places] = 0.0
         self._demands[:, places] = 0.0
@@ -276,7 +300,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         return begun
 
     def _look(self, march: SteppedBatch) -> None:
-        """Take in the next instant of runs; of one that is terminated the last numbers stay."""
+        """Take in the next instant of a march's runs.
+
+        A terminated run keeps its last finite numbers.
+        """
         places = np.array(march.places)[march.alive]
         self._parts[:, places] = march.view()[:, march.alive]
         self._times[places], self._ends[march.places] = march.time, march.times()
@@ -309,7 +336,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         return given
 
     def _seeds(self, given: Any) -> Sequence[int | None]:
-        """A seed for every environment. Raises UsageError."""
+        """A draw's number for every environment, None for one of no study. Raises UsageError.
+
+        `given` is None, the first of as many numbers, or one for each.
+        """
         if given is None:
             return [None] * self.num_envs
         if not np.ndim(given):

@@ -97,11 +97,12 @@ class EpisodeTask:
         self.numbers = self._check_first()
 
     def _check_first(self) -> int:
-        """How many numbers an observation has.
+        """How many numbers an observation has, found by one period in plain Python.
 
         Raises UsageError for a reward that the first period does not define, and for functions that
         do not give numbers.
         """
+        # So that mistakes are reported before anything is compiled.
         plain = self.scenario.simulation.model_copy(update={"compiled": False})
         scenario = self.scenario.model_copy(update={"simulation": plain})
         plan = scenario.plan()
@@ -124,10 +125,10 @@ class EpisodeTask:
         return moment(now.time, parts, demand)
 
     def reward_gained(self, before: Moment, now: Moment) -> Vector:
-        """The user's own reward, a number or one for every run. Raises UsageError for none.
+        """The user's own reward between two moments, a number or one for every run.
 
         Where no time is between the moments, as the run is terminated or over, what is not finite
-        counts as 0: nothing was gained.
+        counts as 0: nothing was gained. Raises UsageError for what is no number.
         """
         assert self.own is not None
         with np.errstate(divide="ignore", invalid="ignore"):  # a sentence says so where it matters
@@ -136,9 +137,9 @@ class EpisodeTask:
         return _finite(given, np.shape(now.time), "reward", now.time, idle)
 
     def observation(self, now: Moment) -> Vector:
-        """What an agent is given of a moment, (numbers,).
+        """What an agent observes of a moment, (numbers,), or (numbers, environments).
 
-        Raises UsageError for no list of numbers.
+        Raises UsageError where the user's function gives no list of numbers.
         """
         if self._observe is None:
             return now.seen.copy()  # of which an agent may make what it likes
@@ -151,7 +152,10 @@ class EpisodeTask:
         return np.array([_finite(part, shape, "observe", now.time) for part in parts])
 
     def _check_reward(self, reward: str) -> str:
-        """The reward's metric. Raises UsageError for one that is not known on the way."""
+        """The reward's metric, if it is gathered during a run.
+
+        Raises UsageError for any other name.
+        """
         known = gathered_metrics(self.scenario)
         if reward in self.scenario.known_metrics() and reward not in known:
             raise UsageError(
@@ -166,7 +170,8 @@ class EpisodeTask:
     def _limits(self, given: Limits | None) -> Vector:
         """Largest surge force [N], yaw moment [N m] and, of an actuator with one, sway force [N].
 
-        Shape (2,) or (3,). Raises UsageError.
+        Shape (2,) or (3,). `given` are the user's own, None for those of the actuator. Raises
+        UsageError.
         """
         limits = numbers(self.scenario.actuator.limits() if given is None else given)
         most, example = "surge force and yaw moment", "limits=(8.0, 2.5) [N, N m]"
@@ -209,7 +214,10 @@ class EpisodeTask:
         return most
 
     def seed(self, given: Any) -> int:
-        """A seed, which is the number of a draw. Raises UsageError."""
+        """A seed as a number: that of a draw, from 0 on.
+
+        Raises UsageError for anything else, and beyond the last Sobol' point.
+        """
         if (number := whole(given)) < 0:
             raise UsageError(f"podusv.gym: the seed is {given!r}; give a whole number from 0 on")
         if not self.sweep.independent and number >= 2**SOBOL_BITS:
@@ -220,22 +228,24 @@ class EpisodeTask:
         return number
 
     def draw_scenario(self, seed: int | None, random: np.random.Generator) -> Scenario:
-        """The scenario with the draw of a study whose number is the seed, or with one of no study.
+        """The scenario with the draw of a study whose number is `seed`.
 
-        Draws of no study are independent, also where those of the study are Sobol' points.
+        Without one, a draw of no study. Draws of no study are independent, also where those of the
+        study are Sobol' points.
         """
         if seed is not None:
             return draw_scenario(
                 self.scenario, self.sweep.vary, next(draws(self.sweep, seed, 1, SWEEP))
             )
         sweep = self.sweep.model_copy(update={"design": "random"})
+        # The number of the draw is itself random, in a stream (LEARNING) that no study has.
         draw = next(draws(sweep, int(random.integers(2**53)), 1, LEARNING))
         return draw_scenario(self.scenario, sweep.vary, draw)
 
     def check_reward(self, gathered: Vector | float, alive: Flags | bool, time: float) -> None:
-        """Raise UsageError for a metric that is not defined at this time [s].
+        """Raise UsageError for a metric (`gathered`) that is not defined at this time [s].
 
-        It may be infinite for a run whose numbers are not finite any more.
+        It may be infinite for a run that is not `alive`: its numbers are not finite any more.
         """
         if (np.isnan(gathered) | np.isinf(gathered) & alive).any():
             raise UsageError(
@@ -247,9 +257,10 @@ class EpisodeTask:
 def _finite(
     given: Any, shape: tuple[int, ...], whose: str, time: Any, idle: Flags | bool = False
 ) -> Vector:
-    """Numbers of a user's function in this shape, also where they are the same for all runs.
+    """Numbers `given` by a user's function in this shape, also where all runs share them.
 
-    Those of `idle` runs may be none, and are 0 then.
+    `whose` names the function in the message, and `time` [s] is when it was called. Numbers of
+    `idle` runs may be NaN or infinite, and are 0 then. Raises UsageError.
     """
     try:
         array = np.broadcast_to(numbers(given), shape)

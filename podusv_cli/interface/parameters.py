@@ -32,7 +32,11 @@ Columns = dict[str, list[Any]]  # by key, with one value a run
 
 
 def columns(parameters: Mapping[str, Any]) -> Columns:
-    """The values as Python's own. Raises ValueError where they are not one a run for every key."""
+    """The values as Python's own, by key, each list with one value a run.
+
+    `parameters` are lists or arrays by key. Raises ParameterError (a ValueError) unless every key
+    has as many values.
+    """
     by_key = {key: _column(key, given) for key, given in parameters.items()}
     lengths = {key: len(column) for key, column in by_key.items()}
     if not by_key:
@@ -45,7 +49,10 @@ def columns(parameters: Mapping[str, Any]) -> Columns:
 
 
 def _column(key: str, given: Any) -> list[Any]:
-    """The values of one key, one a run. Raises ParameterError."""
+    """The values of one key as Python's own, one a run, from a list or array (runs,).
+
+    Raises ParameterError for anything else.
+    """
     array = np.asarray(given, object)
     if array.ndim != 1:
         what = f"an array of shape {array.shape}" if array.ndim else f"{given!r:.60}"
@@ -60,12 +67,16 @@ def in_si(scenario: Scenario, given: Columns) -> Columns:
 
 
 def scenarios(scenario: Scenario, given: Columns) -> list[Scenario]:
-    """The scenario of every run. Raises ValueError for unknown keys and values out of range."""
+    """The scenario of every run; `given` are the values of its keys, one a run.
+
+    Raises ParameterError for unknown keys and values out of range.
+    """
     steps = {key: _steps(scenario, key) for key in given}
     whole = {key for key, at in steps.items() if is_whole(describe_key(scenario, at))}
     made = []
     for row, new in enumerate(zip(*given.values(), strict=True)):
         numbers = {
+            # Arrays of numpy have floats where a whole number is meant.
             steps[key]: int(value) if key in whole and _is_integer(value) else value
             for key, value in zip(given, new, strict=True)
         }
@@ -77,7 +88,10 @@ def scenarios(scenario: Scenario, given: Columns) -> list[Scenario]:
 
 
 def _steps(scenario: Scenario, name: str) -> Route:
-    """The steps of a key. Raises ValueError where runs of a batch cannot differ in it."""
+    """The steps of a key that may differ between runs of a batch.
+
+    Raises ParameterError for others.
+    """
     key = bracketed_key(name)
     steps = route(key)
     section = str(steps[0]) if steps else ""
@@ -102,12 +116,13 @@ def _steps(scenario: Scenario, name: str) -> Route:
 def check_words(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns) -> None:
     """Check the law with every combination of words that the runs have.
 
-    Raises LawError, and ValueError where words, or the least or largest of numbers, change how the
-    loop is put together.
+    `loops` are those of the runs, `given` the values by key. Raises LawError, and ParameterError
+    where words, or the least or largest of numbers, change how the loop is put together.
     """
     _check_ends(scenario, loops, given)
     words = {key: column for key, column in given.items() if any(map(_is_word, column))}
     rows = list(enumerate(zip(*words.values(), strict=True)))
+    # Reversed, so that the first row of each combination is the one that stays.
     first_rows = {combination: row for row, combination in reversed(rows)}
     grid = scenario.time_grid()
     first = Plan(loops[0], grid)
@@ -122,9 +137,10 @@ def check_words(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns)
 
 
 def _check_ends(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns) -> None:
-    """Raise ValueError where the ends of numbers differ in structure from the first run.
+    """Raise ParameterError where the ends of numbers differ in structure from the first run.
 
-    A loop that cannot be made at all is left to the batch, which says so in its row.
+    `loops` are those of the runs, `given` the values by key. A loop that cannot be made at all is
+    left to the batch, which says so in its row.
     """
     numbers = {key: column for key, column in given.items() if not any(map(_is_word, column))}
     grid = scenario.time_grid()

@@ -156,14 +156,14 @@ class Run:
         return xarray.Dataset(arrays, attrs=facts).set_coords("time")
 
     def __getitem__(self, signal: str) -> Vector:
-        """A signal that the log has or that follows from it; KeyError with those that there are."""
+        """A signal that the log has or that follows from it; KeyError names the known ones."""
         if not self.past.has(signal):
             raise KeyError(unknown_word(f"signal {signal!r}", signal, self.recording.signals))
         return self.past.signal(signal)
 
     @with_short_traceback
     def plot(self, *names: str, columns: int = 2) -> Figure:
-        """A matplotlib figure, which notebooks show; `podusv plot --help` tells of the files.
+        """A matplotlib figure, which notebooks show; `podusv plot --help` describes the files.
 
         `names` are that of a figure (`"errors"`), or those of signals, each over time
         (`"psi", "tau_u"`); the trajectory without any. `columns` is its width in columns of a
@@ -212,7 +212,7 @@ class Comparison:
         return page if page.exists() else None
 
     def __getitem__(self, label: str) -> Run:
-        """The run of this label; KeyError with the labels that there are."""
+        """The run of this label; KeyError names the known labels."""
         if label not in self.runs:
             raise KeyError(unknown_word(f"run {label!r}", label, self.runs))
         return self.runs[label]
@@ -281,7 +281,10 @@ def figure(runs: Mapping[str, Run], names: Sequence[str], columns: int = 2) -> F
 
 
 def _family(runs: Mapping[str, Run], names: Sequence[str], shown: Sequence[Shown]) -> Family:
-    """What draws a figure, or signals over time. Raises UsageError."""
+    """The function that draws a named figure, or signals over time. Raises UsageError.
+
+    `shown` are the runs with their looks; those without rows are missing there.
+    """
     from podusv_cli.figures.drawing import figures_of
     from podusv_cli.figures.panels import signals_over_time
 
@@ -301,7 +304,7 @@ def _family(runs: Mapping[str, Run], names: Sequence[str], shown: Sequence[Shown
 
 
 def _html(lines: list[str], runs: Mapping[str, Run], table: str) -> str:
-    """Lines of text over a picture of the trajectories, where there are any, and a table."""
+    """Lines of text over a picture of the trajectories, if any, and a table (HTML)."""
     said = "".join(f"<div>{escape(line)}</div>" for line in lines if line)
     drawable = {label: run for label, run in runs.items() if len(run.recording["time"]) > 1}
     picture = _picture(drawable) if drawable else ""
@@ -309,7 +312,7 @@ def _html(lines: list[str], runs: Mapping[str, Run], table: str) -> str:
 
 
 def _picture(runs: Mapping[str, Run]) -> str:
-    """The tracks as an image inside HTML."""
+    """The tracks of runs (by label) as a PNG inside an HTML image."""
     from podusv_cli.figures.style import image
 
     content: Any = image(figure(runs, ("trajectory",), 1), "png")

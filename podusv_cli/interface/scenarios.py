@@ -82,9 +82,10 @@ def load_scenario(
     silent: bool = False,
     trust: bool = False,
 ) -> Loaded:
-    """A scenario with its text and the origin of each value, see `load`. Raises ScenarioError.
+    """A scenario with its text and the origin of each value, see `load`; `checks` are made of it.
 
-    Unless it is `silent`, a UserWarning names values that a section loses with its kind.
+    Unless it is `silent`, a UserWarning names values that a section loses with its kind. Raises
+    ScenarioError.
     """
     result = _load_source(source, assignments(changes), checks, plugins.of_files(trust))
     if silent:
@@ -108,6 +109,7 @@ def assignments(changes: Changes | None) -> list[str]:
 def _load_source(
     source: Any, overrides: list[str], checks: Sequence[Check], plugged: Plugged
 ) -> Loaded:
+    """Load a scenario's source: here a file; the functions below take other types."""
     return load_file(source, overrides, checks, plugged=plugged)
 
 
@@ -115,6 +117,8 @@ def _load_source(
 def _(
     source: model.Scenario, overrides: list[str], checks: Sequence[Check], plugged: Plugged
 ) -> Loaded:
+    """Load a scenario in memory anew, from what it was given, with overrides and its plug-ins."""
+    # `plugins` and an open choice's `controller` follow from the rest.
     derived = {plugins.KEY, *(["controller"] if source.open_choice else [])}
     sections = {key: part for key, part in source.as_given().items() if key not in derived}
     files = [plugin for plugin in source.plugged if plugin.text]  # as they were when it was loaded
@@ -129,6 +133,7 @@ def _(
     checks: Sequence[Check],
     plugged: Plugged,
 ) -> Loaded:
+    """Load a mapping of sections as the same text in YAML, for the same checks and messages."""
     text = yaml_text(_plain(source))
     return load_text(text, IN_PYTHON, overrides, checks, plugged=plugged, placed=False)
 

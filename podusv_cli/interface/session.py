@@ -87,9 +87,9 @@ def open_session(
 
 
 def waiting(scenario: Scenario, period: float | None) -> tuple[Scenario, float]:
-    """One run of a scenario, with demands in place of its controller; how long they hold [s].
+    """One run of a scenario, with demands in place of its controller, and how long they hold [s].
 
-    Raises UsageError where neither `period` nor the scenario says how long.
+    Raises UsageError where neither `period` nor the scenario says how long, or it does not fit.
     """
     single = next(iter(scenario.singles().values())) if scenario.open_choice else scenario.alone()
     period = single.control.period if period is None else period
@@ -100,6 +100,8 @@ def waiting(scenario: Scenario, period: float | None) -> tuple[Scenario, float]:
     if not math.isfinite(period):
         raise UsageError(f"period is {period}; give a finite time [s], as in period=0.1")
     still = ", 0" * len(single.actuator.limits())
+    # A schedule of two rows, of which the first is written anew for each demand; the second comes
+    # after the end of the run.
     ends = f"0.0{still}\n{2.0 * single.simulation.duration!r}{still}"
     held = single.model_copy(update={"controller": Schedule(between="hold", rows=ends)})
     try:
@@ -172,14 +174,15 @@ class Session:
         reach = len(self._demands) * self._every
         last = reach >= grid.steps
         with np.errstate(all="ignore"):
+            # Past the last step, so that the end is logged as in a run in one go.
             fine = march.to(grid.steps + 1 if last else reach)
         self._status = ("finished" if last else "running") if fine else "diverged"
         return self.observe()
 
     def _check_demand(self, demand: Sequence[float] | Vector) -> tuple[float, ...]:
-        """Surge force [N], yaw moment [N m] and, where there is one, sway force [N].
+        """The demand as numbers: surge force [N], yaw moment [N m] and, if taken, sway force [N].
 
-        Raises UsageError, also after the end of the run.
+        Raises UsageError unless it is so many finite numbers, and after the end of the run.
         """
         if self._status != "running":
             raise UsageError(
@@ -251,7 +254,7 @@ def wanted_numbers(named: Sequence[str]) -> str:
 def schedule_demands(
     scenario: Scenario, period: float, demands: Sequence[tuple[float, ...]]
 ) -> Loaded:
-    """The scenario with a law that holds each of these demands for a period, and then ends."""
+    """The scenario with a law that holds each of `demands` for `period` [s], and then ends."""
     run, every = scenario.simulation, scenario.time_grid().hold_every
     steps = min(len(demands) * every, scenario.time_grid().steps)
     # The last demand has rows at the end and after it, so that the end is no end of the schedule.

@@ -294,7 +294,10 @@ def bench(
 
 
 def _config(source: Source, changes: Changes | None) -> tuple[Config, Sequence[str]]:
-    """What the workflows load, and the changes that it does not have yet."""
+    """What a workflow loads, and the changes that it still has to make.
+
+    A scenario in memory is loaded with its changes, when the workflow asks for it.
+    """
     if isinstance(source, (str, os.PathLike)):
         return Path(source), assignments(changes)
     return partial(load_scenario, source, changes), ()

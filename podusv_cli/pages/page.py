@@ -45,6 +45,7 @@ def environment(package: str) -> Environment:
         loader=loader,
         autoescape=True,
         finalize=_show_value,
+        # A template that names what there is not fails.
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -97,7 +98,7 @@ def _label(text: object) -> str:
 
 
 def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted keys and values of a nested mapping."""
+    """Dotted keys and values of a nested mapping; `prefix` stands before the keys."""
     for key, value in tree.items():
         if isinstance(value, Mapping):
             yield from flat(value, f"{prefix}{key}.")

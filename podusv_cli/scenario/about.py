@@ -19,12 +19,10 @@ from podusv_cli.scenario.settings import changed_settings, parts, settings
 
 
 def about_of(scenario: Scenario, identify: Identify | None = None) -> RunAbout:
-    """What the run of a scenario with one law says about itself.
+    """What the run of a scenario with one law says about itself, for about.json.
 
     `identify` says what a log beside the run calls its quantities; the scenario of one run has no
-    such section.
-
-    Raises LawError where a component of a plug-in fails when it is asked.
+    such section. Raises LawError where a component of a plug-in fails when it is asked.
     """
     try:
         return _told_by(scenario, identify or Identify())
@@ -34,9 +32,9 @@ def about_of(scenario: Scenario, identify: Identify | None = None) -> RunAbout:
 
 
 def identify_of(about: RunAbout | None) -> Identify | None:
-    """What a finished run says that a log beside it calls its quantities; None where it does not.
+    """The columns and frame of a log beside a finished run; None where the run does not say.
 
-    `about` is None of a folder that an older podusv wrote.
+    `about` is None for a folder that an older podusv wrote.
     """
     if about is None or not about.log_columns:
         return None
@@ -85,7 +83,10 @@ def _values(scenario: Scenario) -> dict[str, Any]:
 
 
 def _of_parts(scenario: Scenario) -> dict[str, Any]:
-    """What figures and claims ask of hull, path, actuator and sensors."""
+    """What figures and claims need of hull, path, actuator and sensors.
+
+    Lengths, waypoints and circles are in [m], outages in [s].
+    """
     vessel, path, actuator = scenario.vessel, scenario.path, scenario.actuator
     return {
         "length": vessel.length,
@@ -93,7 +94,9 @@ def _of_parts(scenario: Scenario) -> dict[str, Any]:
         "follows": path.follows,
         "waypoints": tuple(map(tuple, path.waypoints())),
         "circles": tuple(map(tuple, path.circles())),
+        # JSON knows no infinity: None is a demand without limit.
         "limits": tuple(x if math.isfinite(x) else None for x in actuator.limits()),
+        # Three demands, surge, sway and yaw, need a rank of three.
         "underactuated": actuator.input_rank() < 3,
         "outages": scenario.measurement.outages_of_each(),
     }

@@ -33,7 +33,10 @@ class ValueRefused(PodusvError):
 
 @lru_cache(maxsize=1024)
 def steps_at(key: str) -> Route:
-    """`route`, remembered, as every draw asks for the same keys."""
+    """The steps of a key as `route` gives them.
+
+    They are remembered, as every draw asks for the same keys.
+    """
     return route(key)
 
 
@@ -48,7 +51,10 @@ def _fields(kind: type[Component]) -> frozenset[str]:
 
 
 def _inside(whole: Any, step: str | int) -> Any:
-    """One step down: a field by name, an item of a list by index; else LookupError."""
+    """What is one step down in `whole`: a field by name, an item of a list by index.
+
+    Raises LookupError where there is nothing.
+    """
     if isinstance(whole, Component) and step in _fields(type(whole)):
         return getattr(whole, str(step))
     if isinstance(whole, tuple) and isinstance(step, int):
@@ -57,9 +63,10 @@ def _inside(whole: Any, step: str | int) -> Any:
 
 
 def describe_key(scenario: Scenario, steps: Route) -> Key:
-    """What the models say of a key that the scenario has."""
+    """What the models say of the key at `steps`, which the scenario has: unit, range, meaning."""
     way: list[str | int] = []
     for end, step in enumerate(steps, 1):
+        # Keys of a section depend on its kind, so each kind is a step of the way, too.
         kind = getattr(content(scenario, steps[:end]), "kind", None)
         way += [step, kind] if kind else [step]
     return keys_of(type(scenario)).follow(tuple(way))[0]
@@ -76,7 +83,10 @@ def has(scenario: Scenario, key: str) -> bool:
 
 
 def no_entry(scenario: Scenario, steps: Route) -> str:
-    """What a list on the way has, where the step behind it is none of its places; else empty."""
+    """The entries of a list on the way to a key, in words, where `steps` has none of its places.
+
+    Empty where that is not what is wrong.
+    """
     for end in range(1, len(steps)):
         if not has(scenario, dotted_key(steps[:end])):
             return ""
@@ -93,7 +103,7 @@ def is_whole(key: Key) -> bool:
 
 
 def with_values(scenario: Scenario, new: Mapping[Route, Any]) -> Scenario:
-    """The scenario with new values at these places.
+    """The scenario with new values at these places (`new`, by their steps).
 
     Null defaults follow what they are sized by, as they do when a scenario is loaded. Raises
     ValueRefused for a value that is out of range, or that contradicts another.
@@ -114,7 +124,10 @@ def with_values(scenario: Scenario, new: Mapping[Route, Any]) -> Scenario:
 
 
 def _section(scenario: Scenario, section: str, new: Mapping[Route, Any]) -> Any:
-    """A section with new values at these places, checked by its own model."""
+    """A section with new values, checked by its own model.
+
+    `new` has their steps below the section.
+    """
     old = getattr(scenario, section)
     if not isinstance(old, tuple):
         return _part(scenario, (section,), old, new)
@@ -143,7 +156,10 @@ def _part(scenario: Scenario, at: Route, old: Component, new: Mapping[Route, Any
 
 
 def _with(whole: Any, steps: Route, new: Any) -> Any:
-    """Plain data with another value at a place."""
+    """A copy of plain data (dicts and tuples) with `new` at the place that `steps` lead to.
+
+    `whole` is the data; only what lies on the way to the place is copied.
+    """
     if not steps:
         return new
     step = steps[0]
@@ -156,7 +172,11 @@ def _with(whole: Any, steps: Route, new: Any) -> Any:
 def _refusal(
     scenario: Scenario, at: Route, new: Mapping[Route, Any], error: ValidationError
 ) -> ValueRefused:
-    """The first complaint, as a sentence with key, value and range."""
+    """The first complaint of pydantic, as a sentence with key, value and range.
+
+    `at` leads to the part that refused, `new` has the values by their steps below it. A complaint
+    about no single value, such as of two that contradict, names all of them.
+    """
     complaint = error.errors(include_url=False)[0]
     place = next((steps for steps in new if complaint["loc"][: len(steps)] == steps), None)
     if place is None:

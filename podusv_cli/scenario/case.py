@@ -69,7 +69,7 @@ class Case:
 
     @cached_property
     def first_signals(self) -> dict[str, float]:
-        """The law's signals at t = 0; NaN where undefined, as on top of the target."""
+        """The law's signals at t = 0, by name; NaN where undefined, as on top of the target."""
         law = self.scenario.controller
         try:
             _, _, signals = evaluate_law(self.plan, 0.0)

@@ -22,7 +22,10 @@ TIMED = ("simulation", "control", "actuator", "controller", "controllers")  # se
 
 
 def contradictions(scenario: Scenario) -> list[tuple[str, str]]:
-    """Key and message for every pair of values that contradict each other; plans no loop."""
+    """Key and message for every pair of values that contradict each other; plans no loop.
+
+    The second group of checks asks parts that the first has found sound.
+    """
     parts = [*_defaults(scenario), *_conflicts_of_laws(scenario), *_summands(scenario)]
     return parts or [
         *_conflicts_of_commands(scenario),
@@ -34,7 +37,10 @@ def contradictions(scenario: Scenario) -> list[tuple[str, str]]:
 
 
 def clashes(scenario: Scenario, plans: Mapping[str, Plan]) -> Conflicts:
-    """Laws of which two signals of a run would have one name; nobody asks it of a finished run."""
+    """Laws of which two signals of a run would have one name.
+
+    It takes the plans of a load; a finished run has passed this check.
+    """
     for label, plan in plans.items():
         try:
             scenario.about(plan)
@@ -43,9 +49,10 @@ def clashes(scenario: Scenario, plans: Mapping[str, Plan]) -> Conflicts:
 
 
 def of_numbers(scenario: Scenario, sound: Scenario | None = None) -> Conflicts:
-    """Those that other numbers can bring into a scenario that has none, as draws do.
+    """Conflicts that other numbers can bring into a scenario that has none, as draws do.
 
-    `sound` is that scenario; times are those of the same sections.
+    `sound` is a scenario known to have none. Its sections are compared by identity, so that the
+    times of unchanged ones are not checked for every draw.
     """
     if sound is None or any(getattr(scenario, n) is not getattr(sound, n) for n in TIMED):
         yield from _of_times(scenario)
@@ -78,7 +85,7 @@ def _defaults(scenario: Scenario) -> Conflicts:
 
 
 def _summands(scenario: Scenario) -> Conflicts:
-    """A list of no disturbance, and one with two that log the same."""
+    """An empty list of disturbances, and two of them that log the same signals."""
     parts = scenario.disturbances()
     if not parts:
         yield "disturbance", "is an empty list; for calm water write {kind: none}"
@@ -113,7 +120,10 @@ def _conflicts_of_laws(scenario: Scenario) -> Conflicts:
 
 
 def _times(scenario: Scenario, of_laws: Mapping[str, float]) -> Conflicts:
-    """Times [s] that are no whole number of steps; those of the laws by their keys."""
+    """Times [s] that are no whole number of steps.
+
+    `of_laws` are those of the laws, by their keys.
+    """
     step = scenario.simulation.step
     times = {
         "simulation.duration": scenario.simulation.duration,
@@ -123,6 +133,7 @@ def _times(scenario: Scenario, of_laws: Mapping[str, float]) -> Conflicts:
     }
     if max(times.values()) / step > MOST_INSTANTS:
         key, time = max(times.items(), key=lambda item: item[1])
+        # A duration may be long, or the step small: the message is put at what is unusual.
         key = scenario.simulation.outlier if key == "simulation.duration" else key
         count = f"{time:g} s in steps of {step:g} s are {time / step:.3g} steps"
         yield key, f"{count}; no more than {MOST_INSTANTS:.2g} have times of their own"
@@ -141,7 +152,7 @@ def _samples(period: float, sampled: Mapping[str, float]) -> Conflicts:
 
 
 def _seeing(scenario: Scenario) -> Conflicts:
-    """What does not fit the step or the vessel, and an estimator without what it needs."""
+    """Sensors and disturbances that do not fit step or vessel, and estimators that lack a part."""
     step = scenario.simulation.step
     for at, part in scenario.disturbances().items():
         yield from ((f"{at}.{key}", text) for key, text in part.conflicts(scenario.vessel, step))
@@ -155,8 +166,9 @@ def _seeing(scenario: Scenario) -> Conflicts:
 
 
 def _unmet(scenario: Scenario) -> Conflicts:
-    """What laws want of other parts that these have not, each once."""
+    """Sentences on what laws need that path, actuator or estimator lack, each once."""
     laws, path, actuator = scenario.laws().values(), scenario.path, scenario.actuator
+    # The place of the load in an estimator's memory; 0 where none estimates it.
     load_at = 0 if scenario.measurement.is_exact else scenario.estimator.load_at
     found = (text for law in laws for text in unmet(law, path, actuator, load_at))
     yield from dict.fromkeys(found)

@@ -65,7 +65,10 @@ class Knob:
 
 
 def controls(scenario: Scenario, laws: Sequence[str]) -> list[Knob]:
-    """Those of a loop's timing, of these laws (`controller`, `controllers.pid`), then of AFTER."""
+    """The knobs of a loop's timing, then of these laws, then of the sections AFTER.
+
+    `laws` are keys such as `controller` or `controllers.pid`.
+    """
     ruled = {*scenario.keys_by_rule()}
     seas = list(scenario.disturbances())
     names = [n for name in AFTER for n in (seas if name == "disturbance" else [name])]
@@ -75,6 +78,7 @@ def controls(scenario: Scenario, laws: Sequence[str]) -> list[Knob]:
         for control in _of_part(scenario, part, route(part), ruled)
     ]
     first = [_put_first(control) for control in found if _is_of_loop(control)]
+    # Keys that are not in FIRST come behind those, in their own order.
     first.sort(key=lambda control: [*FIRST, control.key].index(control.key))
     return [*first, *(control for control in found if not _is_of_loop(control))]
 
@@ -86,7 +90,7 @@ def _is_of_loop(control: Knob) -> bool:
 
 
 def _put_first(control: Knob) -> Knob:
-    """The control under LOOP, where a sensor's value is called by the sensor, too."""
+    """The control under the heading LOOP, with the sensor's name before its own, if it has one."""
     sensor = control.part.partition(".")[2] if control.part.startswith("measurement.") else ""
     return replace(control, part=LOOP, name=f"{sensor} {control.name}".strip())
 
@@ -112,6 +116,7 @@ def _of_part(scenario: Scenario, part: str, at: Route, ruled: set[Route]) -> Ite
             yield Knob(**found, by_rule=(*at, name) in ruled)
         elif (*at, name) == PLACES and 0 < len(content or ()) <= MOST_PLACES:
             yield from _of_waypoints((*at, name), content)
+        # An actuator without the section `command` has no delay yet, and may be given one.
         elif name == LINK[0] and part == "actuator" and content is None:
             delay = key.keys[name].keys[LINK[1]]
             if found := _control(scenario, part, (*at, *LINK), delay, delay.default):
@@ -119,7 +124,11 @@ def _of_part(scenario: Scenario, part: str, at: Route, ruled: set[Route]) -> Ite
 
 
 def _of_waypoints(at: Route, points: Sequence[Sequence[float]]) -> Iterator[Knob]:
-    """North and east of each point, within as much as the points are apart."""
+    """A knob for north and for east [m] of each point, which reaches as far as the points extend.
+
+    `points` are (n, 2), `at` the steps to the list.
+    """
+    # A single point has no extent: it moves by 1 m.
     reach = max(max(axis) - min(axis) for axis in zip(*points, strict=True)) or 1.0
     for row, point in enumerate(points):
         for column, (name, now) in enumerate(zip(("north", "east"), point, strict=True)):
@@ -139,7 +148,10 @@ def _of_waypoints(at: Route, points: Sequence[Sequence[float]]) -> Iterator[Knob
 def _control(
     scenario: Scenario, part: str, at: Route, key: Key, content: Any
 ) -> dict[str, Any] | None:
-    """The fields of a `Knob` for one key, or None for content that no slider or list can set."""
+    """The fields of a `Knob` for one key, or None for content that no slider or list can set.
+
+    `at` are the steps to the key, `part` is the heading, `content` the value now.
+    """
     place, default, section = dotted_key(at), key.default, str(at[0]).removesuffix("s")
     words = {
         "key": place,
@@ -161,6 +173,7 @@ def _control(
         quantum = scenario.simulation.step if is_stepped else float(is_whole(key))
         length = scenario.vessel.length if key.unit == "m" else 0.0
         span = _span(key, float(content), float(usual), length)
+        # No period or delay lies between 0 and a step.
         if is_stepped and span.get("log"):
             span["low"] = max(span["low"], quantum)
         elif is_stepped:
@@ -172,7 +185,8 @@ def _control(
 def _span(key: Key, now: float, usual: float, length: float) -> dict[str, Any]:
     """The slider's ends: the key's own where it has both, else around the number `now`.
 
-    `usual` is the default; `length` [m] that of the hull, for keys in m, else 0.
+    `usual` is the default; `length` [m] that of the hull for keys in m, else 0. The reach is a
+    factor for numbers above 0, and a width for those of either sign.
     """
     bounds = limits(key.field)
     low = bounds.get("gt", bounds.get("ge"))

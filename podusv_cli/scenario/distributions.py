@@ -37,10 +37,10 @@ class Bounded(Component):
 
     @abstractmethod
     def whole(self, u: Vector) -> Vector:
-        """The values (n,) for shares u (n,) in [0, 1), without `within`."""
+        """The values (n,) for shares u (n,) in (0, 1), without `within`."""
 
     def at(self, u: Vector) -> Vector:
-        """The values (n,) for shares u (n,) in [0, 1), within the bounds."""
+        """The values (n,) for shares u (n,) in (0, 1), within the bounds."""
         if self.within is None:
             return self.whole(u)
         low, high = self.shares
@@ -54,21 +54,23 @@ class Bounded(Component):
 
     @lru_cache(maxsize=256)  # noqa: B019  (a value; a draw asks for it again and again)
     def _share_below(self, x: float) -> float:
-        """The share of the whole distribution at or below x, by bisection.
+        """The share of the whole distribution at or below x, by bisection of (0, 1).
 
-        One look at the distribution gives the answers to the next LEVELS questions, whichever
-        way each is answered.
+        One call of `whole`, which is slow for single numbers, gives the answers to the next LEVELS
+        halvings, whichever way each goes.
         """
         low, high = 0.0, 1.0
         for _ in range(HALVINGS // LEVELS):
             edges = _halving_places(low, high)
             below = self.whole(edges[1:-1]) <= x
             first, last = 0, len(below) + 1
+            # Until no float lies between the two ends.
             while last - first > 1 and low < (middle := edges[(first + last) // 2]) < high:
                 if below[(first + last) // 2 - 1]:
                     first, low = (first + last) // 2, float(middle)
                 else:
                     last, high = (first + last) // 2, float(middle)
+        # 1 itself is above every share that is drawn; else the lower end is on the safe side.
         return high if high == 1.0 else low
 
     @model_validator(mode="after")
@@ -92,7 +94,7 @@ class Normal(Bounded):
     sigma: float = value(..., OF_SECTION, "its standard deviation", gt=0)
 
     def whole(self, u: Vector) -> Vector:
-        """The values (n,) for shares u (n,) in [0, 1), without `within`."""
+        """The values (n,) for shares u (n,) in (0, 1), without `within`."""
         return self.mean + self.sigma * standard_normal(u)
 
 
@@ -105,7 +107,7 @@ class LogNormal(Bounded):
     )
 
     def whole(self, u: Vector) -> Vector:
-        """The values (n,) for shares u (n,) in [0, 1), without `within`."""
+        """The values (n,) for shares u (n,) in (0, 1), without `within`."""
         return self.median * exponential(self.sigma * standard_normal(u))
 
 
@@ -123,7 +125,10 @@ def _halving_places(low: float, high: float) -> Vector:
 
 
 def _check_order(name: str, bounds: tuple[float, ...]) -> None:
-    """Raises ValueError where the first bound is not below the last, or both are too far apart."""
+    """Raises ValueError where the first bound is not below the last, or both are too far apart.
+
+    `name` is the key in messages; the difference has to be finite, as draws are computed with it.
+    """
     low, high = bounds[0], bounds[-1]
     if not low < high:
         raise ValueError(f"{name}: {low:.15g} is not below {high:.15g}")
@@ -132,7 +137,10 @@ def _check_order(name: str, bounds: tuple[float, ...]) -> None:
 
 
 def _corners(name: str, corners: tuple[float, ...]) -> None:
-    """Raises ValueError unless low <= mode <= high and low < high."""
+    """Raises ValueError unless low <= mode <= high and low < high.
+
+    `name` is the key in messages.
+    """
     low, mode, high = corners
     _check_order(name, corners)
     if not low <= mode <= high:
@@ -148,8 +156,9 @@ def _some(name: str, values: tuple[Any, ...]) -> None:
 
 
 def _uniform(bounds: Interval, u: Vector) -> Numbers:
-    """A number between the bounds for each `u` (n,) in [0, 1), all alike likely."""
+    """A number between the bounds for each `u` (n,) in (0, 1), all alike likely."""
     low, high = bounds
+    # Rounding may take the sum beyond a bound.
     return np.clip(low + u * (high - low), low, high)
 
 
@@ -161,7 +170,7 @@ def _rising(name: str, bounds: Interval) -> None:
 
 
 def _log_uniform(bounds: Interval, u: Vector) -> Numbers:
-    """A number between the bounds for each `u` (n,) in [0, 1), uniform in its logarithm.
+    """A number between the bounds for each `u` (n,) in (0, 1), uniform in its logarithm.
 
     Clipped, as the exponential of a logarithm may miss a bound by a rounding.
     """
@@ -171,15 +180,19 @@ def _log_uniform(bounds: Interval, u: Vector) -> Numbers:
 
 
 def _triangular(corners: tuple[float, float, float], u: Vector) -> Numbers:
-    """A number for each `u` (n,) in [0, 1) by the inverse of the distribution function."""
+    """A triangular number for each `u` (n,) in (0, 1).
+
+    It is the inverse of the distribution function at `u`. `corners` are low, mode and high.
+    """
     low, mode, high = corners
     width, rise, fall = high - low, mode - low, high - mode
+    # Each branch is a square root: the density rises and falls linearly.
     up, down = low + np.sqrt(u * width * rise), high - np.sqrt((1.0 - u) * width * fall)
     return np.clip(np.where(u * width < rise, up, down), low, high)
 
 
 def _choice(values: tuple[Any, ...], u: Vector) -> Numbers:
-    """One of `values` for each `u` (n,) in [0, 1), all alike likely; an array of objects (n,).
+    """One of `values` for each `u` (n,) in (0, 1), all alike likely; an array of objects (n,).
 
     It is filled and not made of the tuple: numpy would make strings of mixed values.
     """
@@ -189,13 +202,13 @@ def _choice(values: tuple[Any, ...], u: Vector) -> Numbers:
 
 
 def _integers(bounds: tuple[int, int], u: Vector) -> Numbers:
-    """A whole number between the bounds, both included, for each `u` (n,) in [0, 1)."""
+    """A whole number between the bounds, both included, for each `u` (n,) in (0, 1)."""
     low, high = bounds
     return low + _place(high - low + 1, u)
 
 
 def _place(count: int, u: Vector) -> npt.NDArray[np.int64]:
-    """Which of `count` values each share u (n,) in [0, 1) falls on."""
+    """Which of `count` values each share u (n,) in (0, 1) falls on."""
     return np.minimum((u * count).astype(np.int64), count - 1)
 
 
@@ -263,7 +276,7 @@ class Distribution(Component):
         return [name for name in WAYS if getattr(self, name) is not None]
 
     def at(self, u: Vector) -> Numbers:
-        """The value (n,) for every u (n,) in [0, 1)."""
+        """The value (n,) for every u (n,) in (0, 1)."""
         (name,) = self.given_keys
         return WAYS[name][1](getattr(self, name), u)
 

@@ -115,7 +115,7 @@ def first_sentence(text: str) -> str:
 
 
 def names(plugins: Plugins = ()) -> list[str]:
-    """Every name that can be explained."""
+    """Every name that can be explained, some of them twice: keys, kinds, signals, presets."""
     top = keys_of(scenario_class(plugins))
     places = [place for key in top.all() for place in (key.path, key.route, key.route[-1:])]
     presets = [n for _, given in with_presets(top).values() for n in preset_names(given, plugins)]
@@ -128,7 +128,7 @@ def assignments(plugins: Plugins = ()) -> dict[str, str]:
 
 
 def assignments_in(scenario: Scenario) -> dict[str, str]:
-    """The same for this scenario: keys of the kinds that it has, at their places in it."""
+    """As `assignments`, for this scenario: keys of the kinds that it has, at their places in it."""
     top = keys_of(type(scenario))
     parts = {name: getattr(scenario, name) for name in ALONE}
     parts |= {**scenario.disturbances(), **scenario.laws()}
@@ -140,7 +140,10 @@ def assignments_in(scenario: Scenario) -> dict[str, str]:
 
 
 def _assignments_below(place: str, of: Key, *, of_kinds: bool = True) -> Iterator[tuple[str, str]]:
-    """What `--set` takes below a key, at a place of this name where it has one; and the meaning."""
+    """What `--set` takes below the key `of`, and its meaning: `place.key=`, or `place.key=word`.
+
+    `of_kinds` says whether keys of kinds are among them.
+    """
     for key in of.all():
         given = key.path[len(of.path) :]
         if key.keys or not key.field or not {NAME, NUMBER}.isdisjoint(given):
@@ -152,9 +155,10 @@ def _assignments_below(place: str, of: Key, *, of_kinds: bool = True) -> Iterato
 
 
 def _with_contents(keys: list[Key]) -> list[ExplainRow]:
-    """Keys and kinds, then the keys in them."""
+    """Rows for `keys`, which may be kinds, then for the keys in them."""
     inside = [inner for key in keys for inner in (*key.keys.values(), *key.item_keys)]
     rows = _rows(row for key in inside for row in (key, *key.item_keys))
+    # The head says the kind already.
     if any(key.is_kind for key in keys):
         rows = [replace(row, kinds=()) for row in rows]
     heads = _rows(keys)
@@ -183,7 +187,10 @@ def _rows_named(name: str, top: Key, plugins: Plugins) -> list[ExplainRow]:
 
 
 def _presets(name: str, top: Key) -> list[ExplainRow]:
-    """Every preset of this name: where its numbers come from, and what they hold for."""
+    """Every preset of this name: where its numbers come from, and what they hold for.
+
+    `top` is the scenario's key, with all sections below it.
+    """
     plugins = top.scenario.plugged
     return [
         ExplainRow(
@@ -232,7 +239,7 @@ def _meaning(key: Key) -> str:
 
 
 def choices_of(key: Key) -> tuple[str, ...]:
-    """The words that a value may be; of a kind, all that its section has."""
+    """The words that a value may be: presets, kinds of the section, or those of its type."""
     if key.name == "preset" and key.model.presets:
         return preset_names(key.model.presets, key.scenario.plugged)
     if key.name == "kind":
@@ -241,7 +248,7 @@ def choices_of(key: Key) -> tuple[str, ...]:
 
 
 def _default(key: Key) -> str:
-    """What the value is when it is left out, as it would be written."""
+    """What the value is when it is left out, as YAML or in words; "required" where it cannot be."""
     if key.path in FILLED_IN:
         return FILLED_IN[key.path]
     if key.path[0] in FROM_PRESET and key.path != ("vessel", "preset"):

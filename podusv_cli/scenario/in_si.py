@@ -22,7 +22,10 @@ def in_si(root: Node, top: Key) -> Node:
 
 
 def _convert_node(node: Node, key: Key, usual: str) -> Node:
-    """`usual` is the kind of `controllers` that have none of their own."""
+    """The node with plain numbers; `key` describes it.
+
+    `usual` is the kind of `controllers` that have none of their own: that of `controller`.
+    """
     if isinstance(node.content, dict):
         return replace(node, content=dict(_entries(node, key, usual)))
     if isinstance(node.content, tuple):
@@ -35,12 +38,13 @@ def _convert_node(node: Node, key: Key, usual: str) -> Node:
 def _entries(node: Node, key: Key, usual: str) -> Iterator[tuple[str, Node]]:
     """The entries of a section, by name, with all numbers in SI units.
 
-    `usual` is the kind of a law that names none.
+    `key` describes the section; `usual` is the kind of a law that names none.
     """
     kind = node.word("kind") or (usual if key.path[:1] == ("controllers",) else "")
     section = key.kinds.get(kind, key)
     for name, entry in node.mapping.items():
         below = section.keys.get(name) or key.item(name)
+        # The numbers of a drawn quantity have the unit of the keys that it changes.
         if below and key.path in OF_KEYS and (named := _words(entry.mapping.get("keys"))):
             below = below.of_keys(*named)
         yield name, _convert_node(entry, below, usual) if below else entry

@@ -140,7 +140,7 @@ class Key:
 
     @cached_property
     def kinds(self) -> dict[str, Key]:
-        """The kinds of this section."""
+        """The kinds of this section as keys, by name; none where it has no kinds."""
         parts = {} if self.section else sections(self.annotation)
         return {
             kind: replace(
@@ -169,11 +169,12 @@ class Key:
         return self._key(name, field) if field else None
 
     def _key(self, name: str, field: FieldInfo) -> Key:
-        """The key of the field `name` in this section."""
+        """The key of the field `name` in this section, with the section's default for it."""
         model = self.section or self.model
         # A section that is left out is its default, whatever its own class would start with.
         given = isinstance(self.default, model)
         default = getattr(self.default, name) if given else field.default
+        # A rule gives its number when the scenario is known; until then it is null.
         if name in model.rules:
             default = None
         return Key(
@@ -189,7 +190,10 @@ class Key:
         )
 
     def item(self, step: str | int) -> Key | None:
-        """The item of a list at a position, or the entry of a mapping of names."""
+        """The item of a list at position `step`, or the entry of a mapping of that name.
+
+        None if the key is neither. NUMBER and NAME stand for any position and any name.
+        """
         is_position = isinstance(step, int) or step == NUMBER
         for member in members(self.annotation):
             parts, types = get_args(member), None
@@ -211,19 +215,27 @@ class Key:
         return None
 
     def _unit_of(self, inner: Any, step: str | int) -> str:
-        """The unit of an item; of "m/s, m/s, rad/s" that at its position in the innermost list."""
+        """The unit of an item at `step`, of type `inner`.
+
+        A unit as "m/s, m/s, rad/s" has one for each position in the innermost list.
+        """
         each = self._inner_unit.split(", ")
         innermost = isinstance(step, int) and get_origin(inner) is not tuple
         return each[int(step) % len(each)] if innermost else self._inner_unit
 
     def of_keys(self, *names: str) -> Key:
-        """This entry of `sweep.vary` (see OF_KEYS), whose numbers are those of the keys `names`."""
+        """This entry of `sweep.vary` (see OF_KEYS), whose numbers are those of the keys `names`.
+
+        Its unit is one that all these keys have; a key may belong to several kinds with several
+        units.
+        """
         home = OF_KEYS[self.path[:-1]]
         places = [(*home, name.rpartition(".")[2]) if home else route(name) for name in names]
         each = [[*self.top.follow(place)] for place in places]
         targets = [key for keys in each for key in keys]
         known = [dict.fromkeys(key.unit or PURE for key in keys) for keys in each]
         units = [unit for unit in known[0] if all(unit in others for others in known)]
+        # Of an open list, items have the type of the key itself.
         several = bool(targets) and get_args(self.annotation)[1:] == (Ellipsis,)
         inner = (targets[0].annotation, Ellipsis) if several else ()
         return replace(
@@ -280,7 +292,7 @@ class Key:
 
 
 def _scalars(annotation: Any) -> Iterator[Any]:
-    """The types of single values in an annotation; those within tuples one by one."""
+    """The types of single values in a type `annotation`; those within tuples one by one."""
     for member in members(annotation):
         if get_origin(member) is tuple:
             yield from (scalar for part in get_args(member) for scalar in _scalars(part))
@@ -306,7 +318,7 @@ def limits(field: FieldInfo | None) -> dict[str, Any]:
 
 
 def _metadata(field: FieldInfo) -> Iterator[Any]:
-    """What limits the field, or the number that the field may be beside a word."""
+    """The constraints of a field, also of a number that the field may be beside a word."""
     yield from field.metadata
     for member in get_args(field.annotation):
         if get_origin(member) is Annotated:
@@ -335,7 +347,7 @@ def either(words: tuple[str, ...] | list[str]) -> str:
 
 
 def noun(annotation: Any, *, plural: bool = False) -> str:
-    """What a value is: `a list of 3 numbers`."""
+    """What a value of this type is, in words: `a list of 3 numbers`."""
     parts = sections(annotation)
     others = [
         "a list of these" if parts and _is_list_of(parts, member) else _one(member, plural)
@@ -351,7 +363,10 @@ def _is_list_of(parts: dict[str, type[Component]], annotation: Any) -> bool:
 
 
 def _mapping(parts: dict[str, type[Component]], plural: bool) -> str:
-    """How a mapping is described: kinds by name, or the first keys of the part without kinds."""
+    """How a mapping is described: with its kinds by name, or with the first of its keys.
+
+    `parts` are its classes by kind, "" for one without kinds; `plural` for several mappings.
+    """
     mapping = "mappings of keys" if plural else "a mapping of keys"
     if "" not in parts:
         return f"{mapping} with kind {either(list(parts))}"
@@ -360,7 +375,7 @@ def _mapping(parts: dict[str, type[Component]], plural: bool) -> str:
 
 
 def _one(annotation: Any, plural: bool) -> str:
-    """How one member of an annotation is described to a user: `a list of 2 numbers`."""
+    """How one member of a union is described to a user: `a list of 2 numbers`."""
     parts = get_args(annotation)
     if get_origin(annotation) is Literal:
         return either([str(word) for word in parts])

@@ -22,8 +22,10 @@ def merge_kept(root: Node, top: Key, dropped: list[str]) -> Node:
 def _merge_node(node: Node, key: Key, at: Route, dropped: list[str]) -> Node:
     """The node with what it stands `instead_of` merged in below it, layer by layer.
 
-    `dropped` gathers the keys of lower layers that another kind, at route `at`, has no use for.
+    `key` describes the node and `at` leads to it. Sentences on what another kind has no use for are
+    appended to `dropped`.
     """
+    # That section may itself stand in place of another one.
     if node.instead_of:
         base = _merge_node(node.instead_of, key, at, dropped)
         dropped += [*_lost_keys(base, node, key, at), *_sized_for_another(base, node, key, at)]
@@ -45,11 +47,11 @@ def _merge_node(node: Node, key: Key, at: Route, dropped: list[str]) -> Node:
 
 
 def over(base: Node, own: Node, key: Key) -> Node:
-    """A section over those values of another one that its kind takes, too.
+    """The section `own` over those values of `base` that its kind takes, too.
 
-    `key` is what the models say of both. A key of the same name that has another type or unit is
-    another one, and the default of one kind is nothing for another: a scenario that is written out
-    has all of them. Disturbances are as a whole what they are, and keep nothing of another kind.
+    `key` is what the models say of both. A key of the same name with another type or unit is
+    another key, and the default of one kind means nothing to another: a scenario that is written
+    out has all of them. Disturbances keep nothing of another kind (`stands_alone`).
     """
     new = key.kinds.get(own.word("kind") or base.word("kind"))
     if not new or not isinstance(own.content, dict):
@@ -59,7 +61,10 @@ def over(base: Node, own: Node, key: Key) -> Node:
 
 
 def _is_taken(name: str, base: Node, new: Key, key: Key) -> bool:
-    """Whether a kind takes a value that was given to a section of maybe another kind."""
+    """Whether the kind `new` takes the value `name` of the section `base`.
+
+    The section may be of another kind; `key` is its key.
+    """
     old = key.kinds.get(base.word("kind"))
     if name == "kind" or not old or old.kind == new.kind:
         return name in new.keys
@@ -71,7 +76,10 @@ def _is_taken(name: str, base: Node, new: Key, key: Key) -> bool:
 
 
 def _lost_keys(base: Node, own: Node, key: Key, at: Route) -> list[str]:
-    """What a section does not keep of another one, in a sentence; defaults are not told."""
+    """A sentence on values of `base` that the section `own` does not keep, or an empty list.
+
+    Defaults do not count.
+    """
     old, new = (key.kinds.get(node.word("kind")) for node in (base, own))
     if not old or not new or new.model.stands_alone:
         return []
@@ -88,9 +96,10 @@ def _lost_keys(base: Node, own: Node, key: Key, at: Route) -> list[str]:
 
 
 def _sized_for_another(base: Node, own: Node, key: Key, at: Route) -> list[str]:
-    """The numbers that a section keeps of another one and may be those of its rules, in a sentence.
+    """A sentence on numbers kept from another kind that may have been its defaults, or none.
 
-    A section that is written out has them all as numbers, as if each had been chosen.
+    `base` and `own` are the section below and above, `at` leads to it, `key` describes it. A
+    section that is written out has them all as numbers, as if each had been chosen.
     """
     old, new = (key.kinds.get(node.word("kind")) for node in (base, own))
     if not old or not new or old.kind == new.kind or not base.mapping.keys() >= old.keys.keys():

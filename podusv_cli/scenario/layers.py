@@ -33,12 +33,14 @@ def compose_layers(
 ) -> Node | None:
     """The tree of a scenario's text over what it extends, with the overrides on top.
 
-    None if the text cannot be parsed. File names in `extends` are relative to `source`.
+    None if the text is no mapping. File names in `extends` are relative to `source`. Faults are
+    appended to `faults`, with line and column of the text where `placed`.
     """
     layers = _layers(text, source, faults, placed)
     top = _settings(source, overrides, faults)
     if not layers:
         return None
+    # From the farthest base up to the overrides, each over those before it.
     whole = reduce(partial(_over, faults=faults), [*reversed(layers), top])
     return replace(whole, mark=Mark(source))
 
@@ -46,7 +48,7 @@ def compose_layers(
 def self_contained(
     text: str, source: str, overrides: Sequence[str], faults: list[Fault], most: int
 ) -> Node | None:
-    """As `compose_layers` for a text of at most `most` values that extends no file."""
+    """As `compose_layers`, for a text of at most `most` values that extends no file."""
     node = _mapping(text, source, faults, most=most)
     if node and (above := node.mapping.get("extends")):
         faults.append(Fault(above.mark, "extends", ELSEWHERE))
@@ -68,8 +70,9 @@ def _over(base: Node, top: Node, faults: list[Fault]) -> Node:
 def _layers(text: str, source: str, faults: list[Fault], placed: bool) -> list[Node]:
     """The tree of the scenario's text, then those of all that it extends, nearest first.
 
-    The key `extends` is removed, and of extended files `description`; the first tree is faulty if
-    an extended file cannot be read. Of several bases the later one overrides the earlier.
+    Empty if the text is no mapping. The key `extends` is removed, and of extended files
+    `description`. The first tree is faulty if an extended file cannot be read. Faults are appended
+    to `faults`, with line and column where `placed`.
     """
     node = _mapping(text, source, faults, placed)
     if not node:
@@ -80,7 +83,10 @@ def _layers(text: str, source: str, faults: list[Fault], placed: bool) -> list[N
 
 
 def _bases(node: Node, source: str, faults: list[Fault]) -> Iterator[Node | None]:
-    """The trees of all extended files, nearest first; None for one that cannot be read."""
+    """The trees of all extended files, nearest first; None for one that cannot be read.
+
+    Of several bases the last named comes first, since it overrides those before it.
+    """
     waiting: list[tuple[Node, tuple[str, ...]]] = [
         (name, (source,)) for name in extended_files(node)
     ]
@@ -88,7 +94,7 @@ def _bases(node: Node, source: str, faults: list[Fault]) -> Iterator[Node | None
         name, sources = waiting.pop()
         base = _read_base(name, sources, faults)
         tree = _mapping(base[1], base[0], faults, above=sources) if base else None
-        yield tree and _without(tree, "extends", "description")  # which tells of that file alone
+        yield tree and _without(tree, "extends", "description")  # which is about that file alone
         if base and tree:
             waiting += [(further, (*sources, base[0])) for further in extended_files(tree)]
 
@@ -99,7 +105,7 @@ def _without(node: Node, *keys: str) -> Node:
 
 
 def extended_files(node: Node) -> tuple[Node, ...]:
-    """The file names in `extends`."""
+    """The nodes of the file names in `extends`, which may be one or a list; maybe none."""
     above = node.mapping.get("extends")
     if above is None:
         return ()
@@ -131,7 +137,11 @@ def _mapping(
 
 
 def _named_alike(node: Node, at: Route, faults: list[Fault]) -> Node:
-    """The tree with entries that are named by keys in one form, `disturbance[2].seed`."""
+    """The tree with keys as names in one form, `disturbance[2].seed`.
+
+    That is for sections whose entries are named by keys. `at` leads to the node. A key that is
+    given in both forms is a fault.
+    """
     inside = {(*at, key): entry for key, entry in node.mapping.items()}
     for place, entry in inside.items():
         if any(named[: len(place)] == place for named in NAMED_BY_KEYS):
@@ -150,7 +160,10 @@ def _named_alike(node: Node, at: Route, faults: list[Fault]) -> Node:
 def _read_base(
     above: Node, sources: tuple[str, ...], faults: list[Fault]
 ) -> tuple[str, str] | None:
-    """Name and text of the file that `extends` names, or None and a fault."""
+    """Name and text of the file that `extends` names, or None and a fault.
+
+    `above` is the node of the name, `sources` are the files on the way to it, to find circles.
+    """
     if not isinstance(above.content, str):
         if not above.faulty:
             what = describe_found(above.content, above.text)
@@ -168,7 +181,10 @@ def _read_base(
 
 
 def _override_tree(override: str, faults: list[Fault]) -> Node:
-    """The tree that `a.b=v` stands for; v is a scalar, text in quotes, a list or a mapping."""
+    """The tree that `a.b=v` of `--set` stands for; an empty one with a fault if it cannot be read.
+
+    v is a scalar, text in quotes, a list or a mapping.
+    """
     name, equals, text = override.partition("=")
     shown = override if override.isprintable() else ascii(override)
     mark = Mark(f"--set {shown}")
@@ -189,6 +205,7 @@ def _override_tree(override: str, faults: list[Fault]) -> Node:
         node = plain_node(text.strip(), mark, name.strip(), faults)
     if node is None:
         return Node({}, mark)
+    # From the innermost key outwards.
     for key in reversed(keys):
         node = Node({key: replace(node, key_mark=mark)}, mark)
     return node

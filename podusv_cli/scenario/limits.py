@@ -79,6 +79,7 @@ def estimate(scenario: Scenario, plan: Plan) -> Size:
     grid, about = plan.grid, plan.about
     monitored = len(monitor.signals(plan)) if scenario.log.monitor else 0
     logged = sum(name in about for name in plan.names)
+    # Columns made after the run: of the monitor, and places on earth.
     derived = monitored + (len(PLACE) if scenario.origin else 0)
     content = grid.rows * (logged + derived) * NUMBER
     cosines = sum(part.cosines() for part in scenario.disturbances().values())
@@ -87,6 +88,7 @@ def estimate(scenario: Scenario, plan: Plan) -> Size:
     seconds = START + grid.steps * step * pace + content * BYTE
     unlogged = len(plan.names) - logged + (len(monitor.UNLOGGED) if monitored else 0)
     compress = scenario.log.compress
+    # A large log is written as it grows; compressed ones stay in memory.
     scratch = content + grid.rows * unlogged * NUMBER if content > HELD and not compress else 0
     return Size(grid.steps, grid.rows, content, seconds, scratch, compress)
 
@@ -106,9 +108,10 @@ def largest(loaded: Loaded) -> Size:
 def limits(
     allow_large: bool = False, *, read_back: bool = False, insist: str = "--allow-large"
 ) -> Check:
-    """A check, for `load`, that a scenario is not too large; `insist` is the option that allows it.
+    """A check, for `load`, that a scenario is not too large.
 
-    A log that is to be read back (`read_back`) must not be larger than podusv reads, even with
+    `allow_large` drops what may be dropped; `insist` is the option that allows it, "" for none. A
+    log that is to be read back (`read_back`) must not be larger than podusv reads, even with
     `allow_large`.
     """
 
@@ -125,7 +128,10 @@ def limits(
 
 
 def _too_large(loaded: Loaded, allow_large: bool, read_back: bool, insist: str) -> Conflicts:
-    """Key and message of each limit on steps and on the log's size [bytes] that is exceeded."""
+    """Key and message of each limit on steps and on the log's size [bytes] that is exceeded.
+
+    Arguments as of `limits`; `insist` is the end of a message.
+    """
     if not loaded.plans:  # values contradict each other
         return
     scenario, size = loaded.scenario, largest(loaded)

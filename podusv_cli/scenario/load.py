@@ -109,7 +109,11 @@ class Loaded:
         return list(clashes(self.scenario, self.plans))
 
     def pass_checks(self, faults: list[Fault], checks: Sequence[Check]) -> Loaded:
-        """This, where it has no faults. Raises ScenarioError with them and what the checks find."""
+        """This scenario, if nothing is wrong. Raises ScenarioError with all that is.
+
+        `faults` are those found so far; those of contradictions and `checks` are added, with
+        places.
+        """
         for key, text in chain(self.contradictions, *map(self._faults_by, checks)):
             steps = route(key) if isinstance(key, str) else key
             mark = follow(self.filled, steps)[-1].mark
@@ -119,7 +123,10 @@ class Loaded:
         return self
 
     def _faults_by(self, check: Check) -> tuple[tuple[str | Route, str], ...]:
-        """What a check finds; one that is asked for again, as of a study's only cell, has told."""
+        """What a check finds.
+
+        It is remembered, since a study's only cell is checked as the scenario was.
+        """
         if check not in self._faults_found:
             self._faults_found[check] = tuple(check(self))
         return self._faults_found[check]
@@ -135,7 +142,10 @@ class Loaded:
         return self
 
     def merge_over(self, top: Node, checks: Sequence[Check] = ()) -> Scenario:
-        """The scenario of the same tree with another merged over it. Raises ScenarioError."""
+        """The scenario of the same tree with the tree `top` merged over it.
+
+        Raises ScenarioError.
+        """
         faults: list[Fault] = []
         root = merge(self.root, without_misfits(self.root, top, faults))
         root = merge_kept(root, keys_of(type(self.scenario)), [])
@@ -158,9 +168,9 @@ def load(
 ) -> Loaded:
     """The scenario of a file, with overrides such as `vessel.m=24`.
 
-    `checks` are made after the scenario's own; `files` are plug-ins beside the scenario's, and
-    `plugged` takes in all of them. Raises ScenarioError with all faults, also if the file cannot be
-    read.
+    `checks` are made after the scenario's own. `files` are plug-ins (`--plugin`) beside the
+    scenario's, and `plugged` takes in all of them. Raises ScenarioError with all faults, also if
+    the file cannot be read.
     """
     faults: list[Fault] = []
     source = name_of(path)
@@ -182,8 +192,8 @@ def load_text(
 ) -> Loaded:
     """The scenario of a text; `source` names it in messages and is where its file names start.
 
-    Messages give lines of the text only where `placed`. Raises ScenarioError with everything that
-    is wrong.
+    Messages give lines of the text only where `placed`. The other arguments are those of `load`.
+    Raises ScenarioError with everything that is wrong.
     """
     faults: list[Fault] = []
     root = compose_layers(text, source, overrides, faults, placed=placed)
@@ -203,7 +213,7 @@ def load_stored(
     files: Sequence[str | Plugin] = (),
     plugged: Plugged = LOOKED_AT,
 ) -> Loaded:
-    """The scenario in the folder of a run, study or search: it refers to no file but its plug-ins.
+    """The scenario in the folder of a run, study or search; it refers to no file but its plug-ins.
 
     Unless `plugged` loads these, components are those of podusv and of installed packages. Raises
     StorageError where the text names another file, which is not read, or is no YAML mapping at all;
@@ -215,6 +225,7 @@ def load_stored(
     if root is None or faults:
         raise ScenarioError(_order_faults(faults, source))
     root, known, remarks = _resolve_plugins(root, plugged, files, source, faults)
+    # Only to find the names of files; the result is not used.
     fill_sections(root, keys_of(scenario_class(known)), faults, without_files)
     _raise_damage(faults, source)
     scenario, filled = _build_scenario(root, known, faults, remarks)
@@ -232,9 +243,11 @@ def _raise_damage(faults: list[Fault], source: str) -> None:
 def _resolve_plugins(
     root: Node, plugged: Plugged, files: Sequence[str | Plugin], source: str, faults: list[Fault]
 ) -> tuple[Node, Plugins, list[str]]:
-    """The tree with its plug-ins and with what sections keep of other kinds; what is dropped.
+    """The merged tree, its plug-ins, and remarks on what is dropped.
 
-    Without one of the plug-ins, nothing else can be said of the tree.
+    The tree has what sections keep of a base of another kind. `files` are plug-ins of the command
+    line. Raises ScenarioError where a plug-in is at fault: without it, nothing else can be said of
+    the tree.
     """
     before, dropped = len(faults), list[str]()
     root, known = plugged(plugins.with_given(root, files), faults)
@@ -246,7 +259,10 @@ def _resolve_plugins(
 def _build_scenario(
     root: Node, known: Plugins, faults: list[Fault], remarks: list[str]
 ) -> tuple[Scenario, Node]:
-    """The scenario of a tree, and the tree with what is filled in; `remarks` as `complete`."""
+    """The scenario of a tree, and the tree with presets, files and defaults filled in.
+
+    `known` are the plug-ins; `remarks` takes sentences as `complete` says. Raises ScenarioError.
+    """
     top, source = keys_of(scenario_class(known)), root.mark.source
     root = complete(root, top, faults, remarks)
     scenario = check(root, top, faults)
@@ -278,7 +294,10 @@ def values(scenario: Scenario) -> dict[str, Any]:
 
 
 def _leaves(data: dict[str, Any], above: Route) -> Iterator[tuple[Route, Any]]:
-    """Route and content of each value in nested dicts; `above` is the route of `data` itself."""
+    """Route and content of each value in nested dicts; `above` is the route of `data` itself.
+
+    An empty dict is a value too.
+    """
     for name, content in data.items():
         if isinstance(content, dict) and content:
             yield from _leaves(content, (*above, name))
@@ -289,8 +308,8 @@ def _leaves(data: dict[str, Any], above: Route) -> Iterator[tuple[Route, Any]]:
 def tree_yaml(loaded: Loaded) -> str:
     """The scenario as one file that can be changed like the given one.
 
-    It has what that extends and what was set, and nothing that is filled in: `nominal` follows the
-    vessel, and the laws follow `controller`, as before.
+    It has all that the file extends and all that `--set` gave, and nothing that is filled in:
+    `nominal` follows the vessel, and the laws follow `controller`, as before.
     """
     root = with_contents(loaded.root, keys_of(type(loaded.scenario)), [], [])
     return yaml_text({"name": loaded.scenario.name} | plain(root))

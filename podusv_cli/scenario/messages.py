@@ -35,7 +35,7 @@ def check(root: Node, top: Key, faults: list[Fault]) -> Scenario | None:
 
 
 def with_defaults(key: Key | None, data: Any) -> Any:
-    """The data over the default of its section.
+    """The `data` of a section over its default, which `key` describes; likewise in parts of it.
 
     Otherwise one key given under `disturbance.b_u` would silently set the others to zero.
     """
@@ -60,6 +60,7 @@ def _faults(root: Node, top: Key, error: ValidationError) -> Iterator[Fault]:
 
 def _is_copied(root: Node, route: Route) -> bool:
     """Whether a value was copied from another section, where it has a message already."""
+    # `controller` is then the first of `controllers`, which has the message.
     if stands_in(root) and route[:1] != ("nominal",):
         return route[:1] == ("controller",)
     if route[:1] not in (("nominal",), ("controllers",)):
@@ -69,7 +70,7 @@ def _is_copied(root: Node, route: Route) -> bool:
 
 
 def _key(top: Key, location: Route) -> Key:
-    """The key at pydantic's location, as far as it is known; members of unions do not count."""
+    """The key at pydantic's location, as far as it is known; tags of unions lead nowhere."""
     key = top
     for step in location:
         key = next(iter(key.inside(step)), key)
@@ -82,7 +83,7 @@ def _is_explained(root: Node, route: Route) -> bool:
 
 
 def _unknown_key(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
-    """A key that `section` has not, with the key that may be meant or where it belongs."""
+    """A fault for a key that `section` lacks, with the key that may be meant, or its place."""
     name = str(complaint["loc"][-1])
     route = (*section.path, name)
     node = follow(root, route)[-1]
@@ -91,6 +92,7 @@ def _unknown_key(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
         or _elsewhere(section, name)
         or did_you_mean(name, section.keys)
     )
+    # Kinds as keys are meant as a list, whatever the key is like.
     several = _several(section, follow(root, section.path)[-1])
     hints = several or f"{hint} (allowed: {', '.join(section.keys)})"
     yield Fault(node.key_mark or node.mark, dotted_key(route), f"unknown key{hints}")
@@ -103,7 +105,10 @@ def _hint_of_blank(section: Key, name: str) -> str:
 
 
 def _several(section: Key, given: Node) -> str:
-    """`; for several write a list: ...`, where a section has kinds for keys and may be a list."""
+    """`; for several write a list: ...`, where a section has kinds for keys and may be a list.
+
+    `given` is the section as written, `section` its key. "" elsewhere.
+    """
     whole = section.top.follow(section.path)[0] if section.path else section
     keys = {name for kind in whole.kinds.values() for name in kind.keys}  # `file` is both
     kinds = [name for name in given.mapping if name in whole.kinds and name not in keys]
@@ -114,7 +119,10 @@ def _several(section: Key, given: Node) -> str:
 
 
 def _elsewhere(section: Key, name: str) -> str:
-    """`; K_Pu belongs to kind pid`, or at the top `; did you mean 'controller.K_Pu'?`."""
+    """Where else a key `name` belongs, as the end of a message; "" where it is unknown everywhere.
+
+    `; K_Pu belongs to kind pid`, or at the top `; did you mean 'controller.K_Pu'?`.
+    """
     if section.path:
         same = section.top.follow(section.path)
         of_kinds = {key.kind: key for key in same} if len(same) > 1 else same[0].kinds
@@ -141,7 +149,10 @@ def _home(name: str, kinds: dict[str, Key]) -> str:
 
 
 def _missing(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
-    """A required key that is not there; a missing item is a fault of its list."""
+    """A fault for a required key that is not there; for a missing item, of its list.
+
+    `complaint` is the error of pydantic. No fault where an earlier one explains it.
+    """
     if isinstance(key.path[-1], int):
         yield from _wrong(root, _key(key.top, complaint["loc"][:-1]), complaint)
     elif not _is_explained(root, key.path):
@@ -150,7 +161,10 @@ def _missing(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
 
 
 def _no_kind(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
-    """A section without `kind`; its keys may tell which kind was meant."""
+    """A fault for a section without `kind`; its keys may show which kind was meant.
+
+    No fault where an earlier one explains it.
+    """
     route = (*section.path, "kind")
     if not _is_explained(root, route):
         node = follow(root, section.path)[-1]
@@ -161,7 +175,7 @@ def _no_kind(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
 
 
 def _unknown_kind(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
-    """A kind that `section` has not."""
+    """A fault for a kind that `section` has not, with the kinds that it has."""
     route = (*section.path, "kind")
     node = follow(root, route)[-1]
     what = f"kind {describe_found(node.content, node.text)}"
@@ -176,11 +190,14 @@ def _impossible(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
 
 
 def _wrong(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
-    """A value of the wrong type or out of range, with what is expected and what was found."""
+    """A value of the wrong type or out of range, with what is expected and what was found.
+
+    `key` describes it; `complaint` is pydantic's.
+    """
     node = follow(root, key.path)[-1]
     if (
         isinstance(node.content, dict) and key.section
-    ):  # that may be a number, too: what is in it is told
+    ):  # that may be a number, too: what is in it is reported
         return
     what = describe_found(node.content, node.text)
     yield Fault(
@@ -196,6 +213,7 @@ def _hint(node: Node, key: Key) -> str:
         return f"; write {int(node.content)}"
     if node.content is None and key.section:
         return "; it cannot be left out"
+    # Hydrodynamic derivatives of damping are negative.
     if type(node.content) in (int, float) and limits(key.field).get("le") == 0:
         return f"; it is negative here, as it is published with the force: {-node.content:g}?"
     if node.mapping and str in key.types:

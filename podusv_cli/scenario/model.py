@@ -198,9 +198,10 @@ class Scenario(Component):
         )
 
     def in_numbers(self) -> Scenario:
-        """With a number in place of each null that means "from hull and actuator".
+        """The scenario with a number in place of each null that means "from hull and actuator".
 
         Made once when a scenario is loaded, and again where a draw changes what the facts are of.
+        Raises SizingError where no number follows.
         """
         if not self.keys_by_rule():
             return self
@@ -219,7 +220,10 @@ class Scenario(Component):
         )
 
     def keys_by_rule(self) -> list[tuple[str | int, ...]]:
-        """The steps of every key whose number `in_numbers` gave."""
+        """The steps of every key whose number `in_numbers` gave.
+
+        An example is ("controllers", "pid", "K_P").
+        """
         seas = self.disturbance
         parts: list[tuple[tuple[str | int, ...], Component]] = [
             (("path",), self.path),
@@ -245,7 +249,7 @@ class Scenario(Component):
         return data
 
     def closed_loop(self) -> ClosedLoop:
-        """The closed loop of vessel, path, disturbance, actuator, measurement and law."""
+        """The closed loop of vessel, path, disturbance, actuator, sensors, estimator and law."""
         start = self.start
         return ClosedLoop(
             vessel=self.vessel,
@@ -271,7 +275,7 @@ class Scenario(Component):
         return self.origin.plane if self.origin else None
 
     def time_grid(self) -> TimeGrid:
-        """The instants of a scenario that `conflicts` finds no fault with."""
+        """The steps and logged instants of a scenario whose times `conflicts` has checked."""
         step = self.simulation.step
         steps = whole_steps(self.simulation.duration, step) or 0
         # Beyond the last step only the first is logged; machine code knows no larger numbers.
@@ -288,7 +292,7 @@ class Scenario(Component):
         return {label: single.plan() for label, single in self.singles().items()}
 
     def metrics_of(self, plan: Plan) -> Metrics:
-        """What gathers the numbers of all metrics in such a run."""
+        """The probe that gathers the numbers of all metrics during a run of this plan."""
         return metrics_probe(
             plan,
             known=self.known_metrics(),
@@ -322,7 +326,10 @@ class Scenario(Component):
         return self.time_grid().last_part(self.metrics.steady_fraction)
 
     def passed_by(self, share: float) -> dict[str, float]:
-        """Where this share of the path lies behind the vessel: numbers of the path's `places`."""
+        """How far along the path the vessel is when this `share` (0 to 1) of it lies behind.
+
+        Numbers of the path's `places`, by name.
+        """
         return passed_by(self.path, self.controller, share)
 
     def at_target(self, numbers: Mapping[str, float]) -> bool:
@@ -335,7 +342,7 @@ class Scenario(Component):
         )
 
     def disturbances(self) -> dict[str, Disturbance]:
-        """The disturbance, or each of several, by its key."""
+        """The disturbances by their keys: `disturbance`, or `disturbance[0]`, ... of a list."""
         sea = self.disturbance
         if not isinstance(sea, tuple):
             return {"disturbance": sea}
@@ -376,6 +383,7 @@ def _class(plugins: Plugins, _places: tuple[str, ...]) -> type[Scenario]:
         for name, base in BASES.items()
     }
     sea: Any = kinds["disturbance"]
+    # Types that are made at run time, which mypy cannot follow.
     annotations = kinds | {
         "disturbance": Summands[sea],  # type: ignore[misc]
         "controllers": GenericAlias(dict, (str, kinds["controller"])),
@@ -393,9 +401,10 @@ def _class(plugins: Plugins, _places: tuple[str, ...]) -> type[Scenario]:
 def _unpickle(
     files: Iterable[tuple[str, str]], data: dict[str, Any], open_choice: bool
 ) -> Scenario:
-    """The scenario that another process pickled; `files` are path and text of plug-ins.
+    """The scenario that another process pickled.
 
-    `open_choice` is for a scenario with several laws, of which none was chosen.
+    `files` are path and text of plug-ins, `data` the scenario as given. `open_choice` says that
+    `controller` is the first of several laws itself, not an equal one.
     """
     made = scenario_class((*(from_file(*one) for one in files), *installed_plugins()))(
         **data

@@ -46,8 +46,9 @@ def with_contents(root: Node, top: Key, faults: list[Fault], remarks: list[str])
 
 
 def fill_sections(root: Node, top: Key, faults: list[Fault], fill: Fill) -> Node:
-    """The tree with every section that is a component as `fill` has it."""
+    """The tree with every section that is a component as `fill` makes it; `top` has the keys."""
     default = root.mapping.get("controller")
+    # A law without a kind has that of `controller`.
     usual = {"controllers": default.word("kind")} if default else {}
     for name, entry in root.mapping.items():
         if key := top.keys.get(name):
@@ -59,7 +60,10 @@ def fill_sections(root: Node, top: Key, faults: list[Fault], fill: Fill) -> Node
 def _fill_section(
     node: Node, key: Key, at: Route, fill: Fill, faults: list[Fault], usual: str = ""
 ) -> Node:
-    """A section with what files hold, the sections in it first; `usual` is a kind not given."""
+    """A section with what files hold, the sections in it first.
+
+    `key` describes it, `at` leads to it; `usual` is its kind where it gives none.
+    """
     section = key.kinds.get(node.word("kind") or usual, key)
     if isinstance(node.content, tuple):
         if not (item := key.item(0)) or not item.keys:
@@ -82,7 +86,10 @@ def _fill_section(
 def _read(
     placing: Placing, given: Node, section: str, model: type[Component], faults: list[Fault]
 ) -> Node:
-    """A section of class `model` with what its files hold in place of their names."""
+    """A section of class `model` with what its files hold in place of their names.
+
+    The class says which of its keys name files, and which key takes the content.
+    """
     ways: list[tuple[dict[str, str], Read, Form]] = [
         (model.rows_of, read_text, placing.points),
         (model.texts_of, read_text, _whole),
@@ -106,7 +113,11 @@ def _under(
     remarks: list[str],
     faults: list[Fault],
 ) -> Node:
-    """A section over the values that another program's file has, in place of the file's name."""
+    """A section over the values that another program's file has, in place of the file's name.
+
+    `given` is the section, and `key` names the file. `values_of` reads its text: the values, and
+    sentences on what is left out, which are added to `remarks`.
+    """
     file = given.mapping.get(key)
     if not file or not isinstance(file.content, str):
         return given
@@ -125,7 +136,10 @@ def _under(
 
 
 def _as_node(content: Any, mark: Mark) -> Node:
-    """A value of a file as a node, with the values in it."""
+    """A value of a file (dict, tuple or single value) as a node, with the values in it.
+
+    All values get the same `mark`, that of the file.
+    """
     if isinstance(content, dict):
         return Node({name: _as_node(part, mark) for name, part in content.items()}, mark)
     if isinstance(content, tuple):
@@ -134,7 +148,11 @@ def _as_node(content: Any, mark: Mark) -> Node:
 
 
 def _in_folder(name: str, folder: str, mark: Mark, key: str, faults: list[Fault]) -> str | None:
-    """The text of a file in a folder that podusv finished."""
+    """The text of the file `name` in a folder that podusv finished, or None and a fault.
+
+    `mark` and `key` are where the scenario names the folder.
+    """
+    # The manifest is written last, so without it the folder is unfinished.
     manifest = os.path.join(folder, "manifest.json")
     if not os.path.isfile(manifest) or not os.path.isfile(os.path.join(folder, name)):
         there = os.path.isfile(manifest)
@@ -147,7 +165,10 @@ def _in_folder(name: str, folder: str, mark: Mark, key: str, faults: list[Fault]
 
 
 def without_files(given: Node, section: str, model: type[Component], faults: list[Fault]) -> Node:
-    """The section as it is; a fault for every file that it names itself, not with `--set`."""
+    """The section (`given`) as it is; a fault for every file that it names, but for `--set`.
+
+    A node that `--set` gives has no line. `section` is its key, `model` its class.
+    """
     preset = ["preset"] if model.presets and given.word("preset").endswith(YAML) else []
     named = (model.rows_of, model.texts_of, model.bytes_of, model.folders_of, model.values_of)
     for key in (*chain.from_iterable(named), *preset):
@@ -158,7 +179,10 @@ def without_files(given: Node, section: str, model: type[Component], faults: lis
 
 
 def _over_file(given: Node, section: str, model: type[Component], faults: list[Fault]) -> Node:
-    """A section over the values of the file that its preset is, where it is one."""
+    """A section over the values of the file that its preset is, where it is one.
+
+    `section` is its key and `model` its class. A file that cannot be read makes the section faulty.
+    """
     if not model.presets or not given.word("preset").endswith(YAML):
         return given
     file = given.mapping["preset"]
@@ -167,6 +191,7 @@ def _over_file(given: Node, section: str, model: type[Component], faults: list[F
     base = read(text, path, faults) if text is not None else None
     if base and not base.mapping:
         faults.append(Fault(file.mark, key, f"{path} is no {model.presets.file}: it has no keys"))
+    # The values stand in the tree from here on, so no preset is named any more.
     none = Node("", file.mark)
     rest = replace(given, content={n: e for n, e in given.mapping.items() if n != "preset"})
     if len(faults) > before or not base:
@@ -178,7 +203,10 @@ def _over_file(given: Node, section: str, model: type[Component], faults: list[F
 
 
 def _with_source(whole: Node, base: Node, given: Node) -> Node:
-    """A section over a file with a `source` that names the numbers that are not the file's."""
+    """A section over a file with a `source` that names the numbers that are not the file's.
+
+    `whole` is the merged section, `base` that of the file, `given` that of the scenario.
+    """
     there = {name: plain(entry) for name, entry in base.mapping.items()}
     changed = [n for n, entry in given.mapping.items() if there.get(n) != plain(entry)]
     if not changed or "source" in changed or not base.word("source"):
@@ -191,7 +219,10 @@ def _with_source(whole: Node, base: Node, given: Node) -> Node:
 def _read_in(
     given: Node, section: str, key: str, taker: str, read: Read, form: Form, faults: list[Fault]
 ) -> Node:
-    """The content of the file that one key names, under the key `taker` in place of the name."""
+    """The content of the file that `key` names, under the key `taker` in place of the name.
+
+    `read` reads the file and `form` makes a node of it; both append to `faults`.
+    """
     file = given.mapping.get(key)
     if not file or not isinstance(file.content, str):
         return given

@@ -60,7 +60,10 @@ def _node_of(file: str | Plugin) -> Node:
 
 
 def _list_entries(own: Node) -> list[tuple[Node, Node]]:
-    """The name of each plug-in, and what is required of it: a list, a mapping, or one name."""
+    """The name of each plug-in and what is required of it.
+
+    `plugins` is a list, a mapping or one name.
+    """
     if isinstance(own.content, dict):
         marks = ((name, node.key_mark or node.mark) for name, node in own.content.items())
         return [(Node(name, mark, text=name), own.content[name]) for name, mark in marks]
@@ -74,10 +77,11 @@ def load_plugins(
     """The tree with plug-ins as they stand in resolved.yaml, and the plug-ins.
 
     There a file is named as in the run's folder, with its digest, and an installed package stands
-    where the scenario uses a component of it. Where a plug-in cannot be loaded, or its components
-    are none, there is a fault. Loading a file executes it, so there is a fault for every file that
-    is not `trusted` and is named in the folder of a run, study or search, at any depth, or by what
-    a scenario in one extends; without `own`, for every file that the tree names.
+    where the scenario uses a component of it. A plug-in that cannot be loaded is a fault.
+
+    Loading a file executes it. So there is a fault for every file that is not `trusted` and is
+    named in the folder of a run, study or search, at any depth, or by what a scenario in one
+    extends. Without `own`, there is one for every file that the tree names.
     """
     given = root.mapping.get(KEY) or Node({}, root.mark)
     entries: dict[str, Node] = {}
@@ -85,6 +89,7 @@ def load_plugins(
     for name, wanted in [] if given.faulty else _list_entries(given):
         allowed = trusted or (own and not _is_foreign(name.mark))
         if plugin := _plugin(name, wanted, faults, allowed):
+            # Two files of one name get two names in the run's folder.
             place = next(n for n in _names(plugin) if known.setdefault(n, plugin) == plugin)
             entries[place] = _resolved_entry(plugin, name.mark, wanted)
     plugins = tuple(dict.fromkeys((*known.values(), *installed_plugins())))
@@ -107,7 +112,7 @@ def of_folder(trusted: bool) -> Callable[[Node, list[Fault]], tuple[Node, Plugin
 
 
 def without_own(known: Plugins) -> Callable[[Node, list[Fault]], tuple[Node, Plugins]]:
-    """What takes in none of the plug-ins that a tree names, but these."""
+    """A function that takes in `known` plug-ins, and none of those that a tree names."""
     return lambda root, faults: (
         replace(root, content={k: e for k, e in root.mapping.items() if k != KEY}),
         known,
@@ -121,7 +126,7 @@ def _is_foreign(mark: Mark) -> bool:
 
 
 def _resolved_entry(plugin: Plugin, mark: Mark, given: Node | None = None) -> Node:
-    """The plug-in's entry in resolved.yaml."""
+    """The plug-in's entry in resolved.yaml: what is required (`given`), version and digest."""
     entry = given or Node({}, mark)
     for name in ("version", "sha256"):
         text = getattr(plugin, name)
@@ -139,6 +144,7 @@ def _plugins_used(root: Node) -> Iterator[Plugin]:
     foreign = [
         (section, kind) for section, kind in named if kind not in kinds_of(Scenario, section)
     ]
+    # Making a class for each package takes time, so only where a name is unknown.
     for plugin in installed_plugins() if foreign or vessels else ():
         if vessels & set(preset_names(VESSELS, (plugin,))) or any(
             kind in kinds_of(scenario_class((plugin,)), section) for section, kind in foreign
@@ -154,7 +160,10 @@ def _names(plugin: Plugin) -> tuple[str, ...]:
 
 
 def _plugin(name: Node, wanted: Node, faults: list[Fault], trusted: bool) -> Plugin | None:
-    """The plug-in that the scenario names, or None with a fault."""
+    """The plug-in that the scenario names, or None with a fault.
+
+    `wanted` has what is required of it. A file of a scenario is executed only if `trusted`.
+    """
     if isinstance(name.content, Plugin):
         return name.content
     if not isinstance(name.content, str):
@@ -163,6 +172,7 @@ def _plugin(name: Node, wanted: Node, faults: list[Fault], trusted: bool) -> Plu
         faults.append(Fault(name.mark, KEY, text))
         return None
     is_file = name.content.endswith(".py")
+    # A name without a line is the user's own, from the command line.
     if is_file and name.mark.line and not trusted:
         path = relative_to(name.mark.source, name.content)
         text = (
@@ -214,9 +224,8 @@ def _is_wanted(plugin: Plugin, wanted: Node, faults: list[Fault]) -> bool:
 def used_of(files: Sequence[str], root: Node, faults: list[Fault]) -> tuple[Node, Plugins]:
     """The tree of a finished run, and those of its plug-ins that are at hand.
 
-    The files in its folder are not read, so that looking at it runs nobody's code. Those that
-    the user names (`files`) and installed packages are, where they are the very ones that were
-    used.
+    The files in its folder are not read, so that looking at it runs nobody's code. Those that the
+    user names (`files`) and installed packages count where their digest is that of the run.
     """
     own = root.mapping.get(KEY)
     used = {entry.word("sha256") for entry in own.mapping.values()} if own else set()

@@ -46,6 +46,7 @@ class Placing:
         self._given = root.mapping.get("origin")
         self.remarks = remarks
         self._plane = _plane(self._given) if self._given else None
+        # The origin that the first route gives, where the scenario has none.
         self._first: Node | None = None
 
     def with_origin(self, root: Node) -> Node:
@@ -53,7 +54,11 @@ class Placing:
         return root.with_entry("origin", self._first) if self._first else root
 
     def points(self, text: str, name: str, key: str, faults: list[Fault]) -> Node:
-        """The points of a file's text, north and east [m]: a form of `named_files`."""
+        """The points (n, 2) of a file's text, north and east [m], as a node.
+
+        This is a `Form` of `named_files`. `name` is the file's, `key` the scenario's key that names
+        it.
+        """
         try:
             route = route_of(text) or self._rows_as_places(text)
         except RouteFault as fault:
@@ -70,7 +75,11 @@ class Placing:
         return Node(tuple(_point(pair, name) for pair in pairs), Mark(name))
 
     def _rows_as_places(self, text: str) -> RouteFile | None:
-        """Rows under `lat` and `lon`, or without names about the scenario's origin; else None."""
+        """Rows of latitude and longitude [deg] as a route; None where the rows are something else.
+
+        `text` is the file's. The rows have the names `lat` and `lon`, or no names and lie near the
+        scenario's origin. Raises RouteFault.
+        """
         header, lines = lines_of(text)
         cells = header.cells if header else []
         names = [DEGREES.get(cell.partition("[")[0].strip().lower()) for cell in cells]
@@ -105,6 +114,7 @@ class Placing:
         plane = self._plane or self._take_first(places[0], name)
         north, east = plane.north_east(*np.transpose(places))
         away = float(np.hypot(north, east).max())
+        # Also where the distance is NaN.
         if not away < FAR:
             self.remarks.append(
                 f"{name}: a waypoint is {away / 1000.0:.4g} km from the origin ({plane.lat:g}, "
@@ -114,6 +124,11 @@ class Placing:
         return tuple(zip(north.tolist(), east.tolist(), strict=True))
 
     def _take_first(self, place: Pair, name: str) -> Plane:
+        """The plane whose origin is the first waypoint of the first route [deg].
+
+        It is noted for the other routes.
+        """
+        # A longitude of 0 to 360 deg becomes one of -180 to 180 deg.
         lat, lon = place[0], place[1] - 360.0 * round(place[1] / 360.0)
         mark = Mark(name)
         self._first = Node({"lat": Node(lat, mark), "lon": Node(lon, mark)}, mark)
@@ -169,7 +184,10 @@ def _point(pair: Pair, name: str) -> Node:
 
 
 def _rows(text: str, name: str, faults: list[Fault]) -> Iterator[Node]:
-    """A node for every line: x and y, in the order of the header where there is one."""
+    """A node for every line: x and y [m], in the order of the header where there is one.
+
+    Reading stops after MOST_FAULTS further faults.
+    """
     header, filled = lines_of(text)
     try:
         order = columns(header, METRES, "the file") if header else [0, 1]
@@ -189,7 +207,7 @@ def _rows(text: str, name: str, faults: list[Fault]) -> Iterator[Node]:
 
 
 def _row(line: TextLine, mark: Mark, faults: list[Fault]) -> Node:
-    """A line of a file of points as a list of two numbers; faults for what is no such pair."""
+    """A line of a file of points as a node of two numbers [m]; faults for what is no such pair."""
     numbers = [resolve(cell) for cell in line.cells]
     wrong = [isinstance(n, (str, bool)) or n is None for n in numbers]
     # The line is not shown: the file may be one that the user may not read.

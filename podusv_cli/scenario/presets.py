@@ -61,7 +61,10 @@ def preset_names(presets: Presets, plugins: Plugins = ()) -> tuple[str, ...]:
 def preset_file(
     presets: Presets, name: str, faults: list[Fault], plugins: Plugins = ()
 ) -> Node | None:
-    """The values of a preset by its name, one of `preset_names`."""
+    """The values of a preset by its name, one of `preset_names`; None if its file is no YAML.
+
+    What is wrong with it is appended to `faults`.
+    """
     text = _preset_files(presets, plugins)[name].read_text("utf-8")
     node, faulty = _tree(text, f"{presets.file} {name}.yaml")
     faults += faulty
@@ -91,8 +94,12 @@ def preset_about(presets: Presets, name: str, plugins: Plugins = ()) -> str:
 
 
 def with_presets(top: Key = SCENARIO) -> dict[str, tuple[type[Component], Presets]]:
-    """Every class of components that has presets, and these, by `section.kind`."""
+    """Every class of components that has presets, and these, by `section.kind`.
+
+    `top` is the scenario's key: with plug-ins, it has their kinds, too.
+    """
     sections = [inner for key in top.keys.values() for inner in (key, *key.kinds.values())]
+    # The nominal vessel is of the class of the vessel, whose presets are listed once.
     return {
         dotted_key(key.route): (key.section, key.section.presets)
         for key in sections
@@ -112,7 +119,7 @@ def complete(root: Node, top: Key, faults: list[Fault], remarks: list[str]) -> N
 
 
 def _sections(root: Node, top: Key, faults: list[Fault]) -> Node:
-    """Sections with kinds, completed from presets."""
+    """The tree with all sections of a kind that has presets completed from these."""
     for name, key in top.keys.items():
         given = root.mapping.get(name)
         kind = key.kinds.get(given.word("kind")) if given else None
@@ -123,7 +130,11 @@ def _sections(root: Node, top: Key, faults: list[Fault]) -> Node:
 
 
 def _without_null(root: Node, section: Route = ()) -> Node:
-    """The tree without what is null: sections that null empties, and entries with free names."""
+    """The tree without nulls that take something out.
+
+    These are nulls for sections, and for entries that have names of the user. `section` leads to
+    `root`. Other nulls stay, as values.
+    """
     if section not in BESIDE_NAMED or not root.mapping:
         return root
     entries = {
@@ -137,7 +148,7 @@ def _without_null(root: Node, section: Route = ()) -> Node:
 
 
 def _name(root: Node, faults: list[Fault]) -> Node:
-    """`name` is the file's name without suffix unless given."""
+    """The tree with a `name`: where none is given, the file's name without suffix."""
     if "name" in root.mapping:
         return root
     stem = Path(root.mark.source.removeprefix(PREFIX)).stem
@@ -159,7 +170,10 @@ def _vessel(root: Node, plugins: Plugins, faults: list[Fault]) -> Node:
 
 
 def _nominal(root: Node, plugins: Plugins, faults: list[Fault]) -> Node:
-    """`nominal` is the vessel unless given; with `preset` it starts from that, or from nothing."""
+    """The tree with `nominal`: the vessel, with what is given over it.
+
+    With `preset` it starts from that preset instead, or with an empty one from nothing.
+    """
     vessel = root.mapping["vessel"]
     given = root.mapping.get("nominal")
     if given is None:
@@ -174,16 +188,20 @@ def _nominal(root: Node, plugins: Plugins, faults: list[Fault]) -> Node:
 
 
 def _from_preset(given: Node, key: str, plugins: Plugins, faults: list[Fault]) -> Node:
-    """The vessel's values over those of its preset, where it has one."""
+    """The vessel's values over those of its preset, where it has one; `key` is its section."""
     preset = given.mapping.get("preset")
+    # An empty text says that the vessel has no preset.
     if preset is None or preset.content == "":
-        return _without_preset(given, key, plugins, faults)
+        return _check_required(given, key, plugins, faults)
     vessel = _over_preset(given, key, VESSELS, plugins, faults)
     return replace(vessel, faulty=True) if preset.faulty else _with_source(vessel, plugins)
 
 
-def _without_preset(given: Node, key: str, plugins: Plugins, faults: list[Fault]) -> Node:
-    """A vessel without preset; a fault if it lacks required keys."""
+def _check_required(given: Node, key: str, plugins: Plugins, faults: list[Fault]) -> Node:
+    """The vessel as given, marked faulty if it lacks required keys.
+
+    `key` is its section, `vessel` or `nominal`; the fault is appended to `faults`.
+    """
     fields = Vessel.model_fields.items()
     lacking = [name for name, field in fields if field.is_required() and name not in given.mapping]
     if not lacking or given.faulty:
@@ -206,6 +224,7 @@ def _with_source(vessel: Node, plugins: Plugins) -> Node:
     if not base or not source or not str(source.content).startswith(stem):
         return vessel
     fields = Vessel.model_fields.items()
+    # What the preset gives, and the model's defaults for what it leaves out.
     usual = {name: field.default for name, field in fields if name in COEFFICIENTS}
     usual |= {name: base.get(name) for name in usual if base.get(name) is not None}
     changed = [n for n in usual if n in vessel.mapping and vessel.get(n) != usual[n]]
@@ -217,7 +236,10 @@ def _with_source(vessel: Node, plugins: Plugins) -> Node:
 def _over_preset(
     given: Node, key: str, presets: Presets, plugins: Plugins, faults: list[Fault]
 ) -> Node:
-    """What is given over the values of its preset, where it names one."""
+    """What is given over the values of its preset, where it names one; `key` is the section.
+
+    A preset that is unknown makes the section faulty.
+    """
     preset, names = given.mapping.get("preset"), preset_names(presets, plugins)
     if preset is None or preset.content == "" or preset.faulty:
         return given

@@ -74,8 +74,10 @@ def reference(scenario: Scenario) -> Reference:
     load = _loads(scenario, time, target, turn)
     balance = _balance(scenario, float(load[:, 1].mean()), float(load[:, 2].mean()))
     nu = np.array([(*balance(U, r), r) for U, r in zip(speed.tolist(), turn.tolist(), strict=True)])
+    # Where no heading can follow, the demand is that of moving along the course without sway.
     held = np.where(np.isnan(nu), np.column_stack([speed, 0.0 * speed, turn]), nu)
     k = bundle(scenario.vessel.constants())
+    # Of C nu, which the hull may have a share of only; (surge, sway, yaw).
     less = np.array([lacking(u, v, r, k) for u, v, r in held.tolist()])
     demand = -np.array(
         [(surge_force(u, v, r, k), yaw_moment(u, v, r, k)) for u, v, r in held.tolist()]
@@ -86,9 +88,10 @@ def reference(scenario: Scenario) -> Reference:
 
 
 def _reference_of_poses(scenario: Scenario, time: Vector) -> Reference:
-    """The same where the path has a heading, and the law pushes sideways: tau = M nu' - f(nu) - b.
+    """The reference (n,) where the path has a heading and the law pushes sideways.
 
-    nu = R^T p_d' with the rate of the heading; nu' = R^T p_d'' - r S nu.
+    tau = M nu' - f(nu) - b with nu = R^T p_d' and the rate of the heading; nu' = R^T p_d'' - r S
+    nu. `time` is (n,) [s].
     """
     rows, vessel = scenario.path.whole_targets(time.tolist()), scenario.vessel
     psi, r, r_dot = rows[:, PSI_D:].T
@@ -110,23 +113,28 @@ def _reference_of_poses(scenario: Scenario, time: Vector) -> Reference:
     )
     growth = np.column_stack([a + r * v, b - r * u, r_dot])
     tau = growth @ inertia.T - forces - less - load
+    # Surge, yaw, sway: the order of `demand`.
     return Reference(time, np.hypot(u, v), nu, load, tau[:, [0, 2, 1]])
 
 
 def _motion(target: Vector) -> tuple[Vector, Vector, Vector]:
     """Speed [m/s], rate of the course [rad/s] and tangential acceleration [m/s2], each (n,).
 
-    `target` is (n, 6).
+    `target` (n, 6) has position, velocity and acceleration, north and east.
     """
     _, _, x_dot, y_dot, x_ddot, y_ddot = target.T
     speed = np.hypot(x_dot, y_dot)
     moving = np.where(speed > STANDING, speed, np.inf)
+    # Rounded, so that a circle has one turn rate and `_balance` solves for it once.
     turn = np.round((x_dot * y_ddot - y_dot * x_ddot) / moving**2, 9)
     return np.round(speed, 9), turn, (x_dot * x_ddot + y_dot * y_ddot) / moving
 
 
 def _loads(scenario: Scenario, time: Vector, target: Vector, turn: Vector) -> Vector:
-    """The disturbance (n, 3) on a hull at the target's position and velocity."""
+    """The disturbance (n, 3) [N, N, N m] on a hull at the target's position and velocity.
+
+    `target` is (n, 6) as in `_motion`, `turn` (n,) the rate of its course [rad/s].
+    """
     sea, vessel = scenario.sea, scenario.vessel
     course = np.arctan2(target[:, 3] + 0.0, target[:, 2] + 0.0)  # -0.0 is no half turn
     speed = np.hypot(target[:, 2], target[:, 3])
@@ -170,6 +178,7 @@ def root(function: Callable[[float], float], low: float, high: float) -> float:
     """The zero of a function that falls from `low` to `high`; NaN where it has none."""
     if not function(low) >= 0.0 >= function(high):
         return math.nan
+    # More than enough for the 53 bits of a float's mantissa, in m/s.
     for _ in range(50):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if function(middle) >= 0.0 else (low, middle)

@@ -75,7 +75,10 @@ def route_of(text: str) -> RouteFile | None:
 
 
 def without_repeats(route: RouteFile) -> RouteFile:
-    """The route without a waypoint that repeats the one before. Raises RouteFault."""
+    """The route without waypoints that repeat the one before, which would be legs of no length.
+
+    Raises RouteFault where nothing is left.
+    """
     if not route.pairs:
         others = f"; left out: {', '.join(route.left_out)}" if route.left_out else ""
         raise RouteFault(f"has no waypoints{others}")
@@ -87,7 +90,7 @@ def without_repeats(route: RouteFile) -> RouteFile:
 
 
 def _waypoint_list(text: str) -> RouteFile:
-    """`QGC WPL 110`: a row an item; item 0 in frame 0 is where ArduPilot's home was."""
+    """The route of a `QGC WPL 110` text: a row an item; item 0 in frame 0 is ArduPilot's home."""
     items, home = list[MissionItem](), False
     for number, line in enumerate(text.splitlines()[1:], 2):
         if not line.strip() or line.startswith("#"):
@@ -95,6 +98,7 @@ def _waypoint_list(text: str) -> RouteFile:
         cells = line.split()
         if len(cells) < 12 or not all(map(NUMBER.fullmatch, cells[:12])):
             raise RouteFault(f"line {number} is no item of QGC WPL 110, which has 12 numbers")
+        # Columns of the format: frame, command, latitude, longitude.
         frame, command, lat, lon = (float(cells[i]) for i in (2, 3, 8, 9))
         home = home or (not items and frame == 0.0)
         items.append((_whole(frame), _whole(command), lat, lon))
@@ -104,7 +108,7 @@ def _waypoint_list(text: str) -> RouteFile:
 
 
 def _plan(text: str) -> RouteFile:
-    """QGroundControl's .plan, or GeoJSON."""
+    """The route of a JSON text: QGroundControl's .plan, or GeoJSON. Raises RouteFault."""
     try:
         data = json.loads(text)
     except ValueError as error:
@@ -120,6 +124,7 @@ def _plan(text: str) -> RouteFile:
         frame, command = (_whole(_number(item.get(key, usual))) for key, usual in USUAL.items())
         where: Sequence[Any] = (0.0, 0.0)
         if command in PLACES:
+            # Old plans have a coordinate, new ones seven params with the place at 4 and 5.
             where = _list(item.get("coordinate"))[:2] or _list(item.get("params"))[4:6]
         if len(where) < 2:
             raise RouteFault("has a waypoint without latitude and longitude")
@@ -129,7 +134,10 @@ def _plan(text: str) -> RouteFile:
 
 
 def _simple_items(items: Any) -> Iterator[Mapping[str, Any]]:
-    """The items of a mission; those that a survey or a corridor is made of in its place."""
+    """The items of a mission; a survey or a corridor is replaced by the items that it consists of.
+
+    `items` is a list as the file has it, unchecked. Raises RouteFault for an item that is none.
+    """
     for item in _list(items):
         if not isinstance(item, Mapping):
             raise RouteFault("has a mission item that is no mapping")
@@ -157,6 +165,7 @@ def _of_mission(items: Sequence[MissionItem]) -> RouteFile:
             places.append((lat, lon))
     if len(frames) > 1:
         raise RouteFault("has waypoints in degrees and in metres; write them in one frame")
+    # Without any waypoint, the frame does not matter.
     return RouteFile(tuple(places), on_earth=frames != {False}, left_out=_counts(others))
 
 
@@ -166,7 +175,10 @@ def _counts(others: Mapping[str, int]) -> tuple[str, ...]:
 
 
 def _geojson(data: Mapping[str, Any]) -> RouteFile:
-    """The first line of GeoJSON, or its points in their order."""
+    """The first line of GeoJSON, or its points in their order.
+
+    `data` is the file's content. What else it has is counted in `left_out`.
+    """
     lines, points, others = [], [], Counter[str]()
     for geometry in _geometries(data):
         kind, where = str(geometry.get("type")), geometry.get("coordinates")
@@ -179,11 +191,13 @@ def _geojson(data: Mapping[str, Any]) -> RouteFile:
         else:
             others[kind[:LONGEST_NAME]] += 1
     chosen, left_out = _line_or_points(lines, points)
+    # GeoJSON has the longitude first.
     pairs = tuple((_number(_at(p, 1)), _number(_at(p, 0))) for p in _list(chosen))
     return RouteFile(pairs, left_out=(*left_out, *_counts(others)))
 
 
 def _geometries(data: Any) -> Iterator[Mapping[str, Any]]:
+    """The geometries of GeoJSON, at any depth of collections and features. Raises RouteFault."""
     if not isinstance(data, Mapping):
         raise RouteFault("has a part of GeoJSON that is no mapping")
     for inner in [*_list(data.get("features")), *_list(data.get("geometries"))]:
@@ -197,7 +211,10 @@ def _geometries(data: Any) -> Iterator[Mapping[str, Any]]:
 def _line_or_points(
     lines: Sequence[Any], points: Sequence[Any]
 ) -> tuple[Sequence[Any], tuple[str, ...]]:
-    """The first line where there is one, else all points; and what of them is left out."""
+    """The first line where there is one, else all points; and what is left out, in words.
+
+    `lines` and `points` hold coordinates as the file has them.
+    """
     if not lines:
         return points, ()
     others = {"lines after the first": len(lines) - 1, "single points": len(points)}
@@ -205,7 +222,8 @@ def _line_or_points(
 
 
 def _xml(text: str) -> RouteFile:
-    """GPX or KML."""
+    """The route of an XML text: GPX or KML. Raises RouteFault."""
+    # Entities may expand without end.
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise RouteFault("has a document type or entities, which are not read")
     try:
@@ -268,7 +286,7 @@ def _track_places(track: ElementTree.Element) -> list[Pair]:
 
 
 def _moos(text: str) -> RouteFile:
-    """The first points of a MOOS-IvP behaviour, whose x is east and y north.
+    """The first points of a MOOS-IvP behaviour, whose x is east and y north [m].
 
     A polygon by its form (`format=radial, x=75, ...`) has no points.
     """
@@ -286,6 +304,7 @@ def _moos(text: str) -> RouteFile:
         if not match or not all(map(NUMBER.fullmatch, match.groups())):
             odd += not LABEL.fullmatch(part)  # `label, survey`: a setting among the points
             continue
+        # North first, as everywhere in podusv.
         pairs.append((float(match[2]), float(match[1])))
     counts = {"points that are no two numbers": odd, "lists of points after the first": len(others)}
     left_out = _counts(counts | forms)
@@ -307,7 +326,7 @@ def _at(place: Any, index: int) -> Any:
 
 
 def _number(part: Any) -> float:
-    """A number of a file. Raises RouteFault."""
+    """A latitude or longitude of a file as a number. Raises RouteFault."""
     text = str(part).strip()
     if not NUMBER.fullmatch(text) or not math.isfinite(float(text)):
         raise RouteFault("has a waypoint whose latitude or longitude is no number")
@@ -322,9 +341,13 @@ FORMATS: Mapping[str, Callable[[str], RouteFile]] = {
 
 
 def beyond_earth(pairs: Iterable[Pair]) -> str:
-    """What is wrong with the first place that is not on earth; "" where all are."""
+    """What is wrong with the first place (latitude, longitude) [deg] that is not on earth.
+
+    "" if all places are.
+    """
     for lat, lon in pairs:
         if abs(lat) > 90.0:
+            # As NMEA writes places: two digits of degrees, then minutes below 60.
             minutes = abs(lat) <= 9000.0 and abs(lat) % 100.0 < 60.0
             hint = "degrees and minutes, ddmm.mmmm? write dd + mm.mmmm / 60" if minutes else ""
             return f"latitude {lat:.10g} is beyond 90 deg{'; ' + hint if hint else ''}"

@@ -35,12 +35,14 @@ def json_schema(codes: Sequence[str], plugins: Plugins = ()) -> dict[str, Any]:
     top = keys_of(scenario_class(plugins))
     made = top.scenario.model_json_schema()
     definitions = {name: _convert_schema(part) for name, part in made["$defs"].items()}
+    # What the models have as default is not what a file gets that leaves the key out.
     for model in _filled_from_outside(top):
         for part in definitions[_name(model, definitions)]["properties"].values():
             part.pop("default", None)
     for key in top.all():
         if key.field and key.name in key.model.rules:
             definitions[_name(key.model, definitions)]["properties"][key.name]["default"] = None
+    # A preset is a known name or a YAML file.
     for model, presets in with_presets(top).values():
         properties = definitions[_name(model, definitions)]["properties"]
         named = {"enum": ["", *preset_names(presets, plugins)]}
@@ -70,7 +72,10 @@ def schema_text(codes: tuple[str, ...], plugins: Plugins = ()) -> str:
 
 
 def _whole(items: dict[str, Any], definitions: Mapping[str, Any]) -> dict[str, Any]:
-    """Items of a list with the keys that they need, which no other file can give."""
+    """Items of a list with all keys that they need, as no other file can complete an item.
+
+    `items` is their schema (`anyOf` with references), `definitions` are the schemas referred to.
+    """
     choices = []
     for choice in items["anyOf"]:
         needed = definitions[choice["$ref"].rpartition("/")[2]].get("required", [])
@@ -91,7 +96,7 @@ def _filled_from_outside(top: Key) -> set[type[Component]]:
 
 
 def _convert_schema(schema: dict[str, Any]) -> dict[str, Any]:
-    """A schema of pydantic's dialect (2020-12) in draft-07."""
+    """A schema of pydantic's dialect (2020-12) in draft-07, with units in the descriptions."""
     made = {word: _inside(word, part) for word, part in schema.items() if word not in DROPPED}
     if "description" in made:
         unit = schema.get("unit")
@@ -126,9 +131,13 @@ def _number_in(unit: str) -> dict[str, Any]:
 
 
 def _or_with_unit(schema: dict[str, Any], unit: str) -> dict[str, Any]:
-    """The schema whose numbers may also be written with a unit."""
+    """The schema whose numbers may also be written with a unit of the quantity `unit`.
+
+    Items, entries and alternatives are rewritten, too; `schema` itself stays as it is.
+    """
     made = dict(schema)
     if made.get("type") == "number":
+        # An editor looks for these beside `anyOf`, not within it.
         outside = {word: made.pop(word) for word in ("default", "description") if word in made}
         return outside | {"anyOf": [made, {"$ref": f"#/definitions/{_in(unit)}"}]}
     for word in ("items", "anyOf"):
@@ -147,12 +156,13 @@ def _choices(part: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _inside(word: str, part: Any) -> Any:
-    """The content of one keyword `word` of a JSON schema, rewritten from pydantic's dialect."""
+    """The content `part` of a schema's keyword `word`, rewritten from pydantic's dialect."""
     if word in ("properties", "patternProperties"):
         return {name: _convert_schema(schema) for name, schema in part.items()}
     if word == "$ref":
         return part.replace("#/$defs/", "#/definitions/")
     if isinstance(part, list) and word != "enum":
         return [_convert_schema(schema) if isinstance(schema, dict) else schema for schema in part]
+    # Defaults and enums are data, which may look like schemas.
     is_schema = isinstance(part, dict) and word != "default"
     return _convert_schema(part) if is_schema else part

@@ -29,7 +29,7 @@ SECTIONS = (
     "control",
     "metrics",
 )
-WHICH = ("kind", "preset")  # are told although they equal the default or preset
+WHICH = ("kind", "preset")  # are listed although they equal the default or preset
 
 
 def settings(part: Component, facts: Facts | None = None) -> list[SettingAbout]:
@@ -64,10 +64,15 @@ def parts(scenario: Scenario) -> dict[str, Component]:
 
 
 def _preset(part: Component) -> Component | None:
-    """The part as its preset alone would make it; None without a preset."""
+    """The part as its preset alone would make it.
+
+    None without a preset, and also for a preset that is a file or a plug-in's: only podusv's own
+    names are known here.
+    """
     name, presets = getattr(part, "preset", ""), type(part).presets
     if not presets or name not in preset_names(presets):
         return None
+    # Faults are thrown away: presets of podusv have none, as tests check.
     node = preset_file(presets, name, [])
     return type(part)(**{**plain(node), "preset": name}) if node else None
 
@@ -113,7 +118,7 @@ def _settings(
 
 
 def _inside(content: Any) -> dict[str, Component]:
-    """The parts that a value consists of, by what leads to them."""
+    """The parts that a value consists of, by what leads to them: "" for itself, "0." in a list."""
     if isinstance(content, Component):
         return {"": content}
     several = content if isinstance(content, tuple) else ()

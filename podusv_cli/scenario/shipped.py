@@ -15,14 +15,14 @@ RENAMED = "renamed.txt"  # beside the scenarios: a folder's old name and its new
 
 
 @cache
-def folder(room: str = "configs") -> Path:
-    """Where the shipped scenarios, or pages or examples, are on this machine.
+def folder(top: str = "configs") -> Path:
+    """Where a top folder of the repository (configs, docs, examples, ...) is on this machine.
 
     An installed package has them inside; in a checkout they lie beside it.
     """
     package = Path(podusv_cli.__file__).parent
-    inside = package / room
-    return inside if inside.is_dir() else package.parent / room
+    inside = package / top
+    return inside if inside.is_dir() else package.parent / top
 
 
 @cache

@@ -81,7 +81,11 @@ class Quantity(Distribution):
         return bool(self.times or self.plus)
 
     def value(self, own: Any, drawn: Any, place: int = 0) -> Any:
-        """The value of the key at a place of `targets`, from the scenario's own and the draw."""
+        """The value of a key, from the scenario's `own` value and what was `drawn`.
+
+        A factor or a summand applies to the own value; other draws replace it. `place` is the key's
+        position in `targets`; for rows, `drawn` is the number of the row.
+        """
         if self.rows:
             numbers = self.lines.rows[drawn]
             return float(numbers[place % len(numbers)])
@@ -90,7 +94,7 @@ class Quantity(Distribution):
         return own + drawn if self.plus else drawn
 
     def targets(self, name: str) -> tuple[str, ...]:
-        """The keys that the quantity of this name changes."""
+        """The keys that the quantity called `name` changes; for rows, a key for each column."""
         keys = self.keys or (name,)
         if self.rows:
             return tuple(f"{key}.{column}" for key in keys for column in self.lines.names)

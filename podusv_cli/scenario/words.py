@@ -26,7 +26,7 @@ def in_words(quantity: Quantity) -> str:
 
 
 def of_distribution(distribution: Distribution) -> str:
-    """Such as `uniform from 0.7 to 1.3`."""
+    """A distribution in words, such as `uniform from 0.7 to 1.3`."""
     (name,) = distribution.given_keys
     content = getattr(distribution, name)
     return WORDS[name](content) + _cut(getattr(content, "within", None))

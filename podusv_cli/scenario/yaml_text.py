@@ -70,12 +70,16 @@ OPENING = ("unexpected end of stream", "but got '<stream end>'")
 
 
 def read_bytes(path: str, mark: Mark, key: str, faults: list[Fault]) -> bytes | None:
-    """What a file holds, or None and a fault at `mark`."""
+    """What a file holds, or None and a fault at `mark`, under the key that names the file.
+
+    `path` is a file or a `podusv:` name. The message names it unless `mark` does.
+    """
     named = "" if mark == Mark(path) else f"{quote(path)} "
     try:
         with open(file_of(path), "rb", opener=_nonblocking_opener) as file:
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
                 raise ValueError("a pipe or device; save it as a file first")
+            # One byte more, which shows that it is too large.
             data = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         reason = str((isinstance(error, OSError) and error.strerror) or error)
@@ -100,6 +104,7 @@ def _guess_path(path: str) -> str:
         near = [file for file in sorted(os.listdir(folder or ".")) if file.endswith(ENDINGS)]
     whole = [os.path.join(folder, name + end) for end in ENDINGS if name + end in near]
     shipped = [name for name in names() if name in (PREFIX + path, f"{PREFIX}{path}.yaml")]
+    # A name without its ending, or of a shipped scenario without its prefix, is not a guess.
     if exact := [*whole, *shipped]:
         return f"; did you mean {quote(exact[0])}?"
     stems = {os.path.splitext(file)[0]: file for file in near}
@@ -140,7 +145,10 @@ def _place(source: str, before: str) -> Mark:
 
 
 def resolve(text: str) -> bool | int | float | str | None:
-    """The value of a plain scalar; a number that is too large becomes infinite."""
+    """The value of a plain scalar: a word of YAML, a number, or else the text itself.
+
+    A number that is too large becomes infinite.
+    """
     if text in WORDS:
         return WORDS[text]
     if INTEGER.fullmatch(text):
@@ -161,7 +169,10 @@ def plain_node(text: str, mark: Mark, key: str, faults: list[Fault]) -> Node:
 
 
 def text_node(content: Any, mark: Mark, key: str, faults: list[Fault], *, text: str = "") -> Node:
-    """The node of a scalar; control characters are a fault."""
+    """The node of a scalar; control characters are a fault, as a terminal may obey them.
+
+    `content` is the value, `text` the scalar as written, and `key` where it stands.
+    """
     unfit = [c for c in str(content) if unicodedata.category(c) in ("Cc", "Cs") and c not in "\t\n"]
     if unfit:
         faults.append(Fault(mark, key, f"character U+{ord(unfit[0]):04X} cannot stand in text"))
@@ -179,8 +190,8 @@ def read(
 ) -> Node | None:
     """The tree of a single YAML document of at most `most` values; None if that is not possible.
 
-    Every fault is appended to `faults`. Marks have lines only where `placed`, and then the files
-    `above` that extend this one.
+    `text` is that of the file `source`. Every fault is appended to `faults`. Marks have lines only
+    where `placed`, and then the files `above` that extend this one.
     """
     reader = _Reader(text, source, faults, placed, most, above)
     try:
@@ -193,7 +204,8 @@ def read(
 def _events(text: str) -> Iterator[Any]:
     """The parser's events, by libyaml where it reads the text as PyYAML's own parser does.
 
-    libyaml is twenty times faster; where it stops, PyYAML goes on, whose messages say more.
+    libyaml is twenty times faster. Where it stops with an error, PyYAML goes on behind the events
+    that are out already, since its messages say more.
     """
     given = 0
     if not READ_ELSE.search(text):
@@ -251,7 +263,7 @@ class _Reader:
         return node
 
     def _next(self) -> Any:
-        """The next event of PyYAML, whose errors become _CannotContinue with a place."""
+        """The next event of PyYAML. Raises _CannotContinue, with a place, for its errors."""
         try:
             event: Any = next(self._events)
         except yaml.MarkedYAMLError as error:
@@ -272,6 +284,7 @@ class _Reader:
         problem = error.problem or "unreadable"
         known = [text for part, text in SYNTAX.items() if part in problem]
         opened = any(part in problem for part in OPENING)
+        # Where something opened that never ends, its start says more than the end of the file.
         mark = error.context_mark if opened else error.problem_mark
         text = known[0] if known else "not valid YAML: {problem}"
         line = self._text.splitlines()[mark.line : mark.line + 1] if mark else []
@@ -293,7 +306,10 @@ class _Reader:
         self._faults.append(Fault(self._start(event), dotted_key(route), text))
 
     def _node(self, event: Any, route: Route) -> Node:
-        """The tree that begins with `event`, at `route`; aliases, anchors and tags are faults."""
+        """The tree that begins with `event`, at `route`; aliases, anchors and tags are faults.
+
+        Raises _CannotContinue where there are too many values or levels.
+        """
         self._nodes += 1
         if self._nodes > self._most:
             raise _CannotContinue(self._start(event), f"more than {self._most:,} values")
@@ -319,7 +335,10 @@ class _Reader:
         return replace(node, faulty=node.faulty or bool(event.tag))
 
     def _list(self, event: Any, route: Route) -> Node:
-        """A list; without items where one of them is faulty, so that its length is not judged."""
+        """The node of a list that begins with `event`, at `route`.
+
+        It has no items where one of them is faulty, so that its length is not judged.
+        """
         items: list[Node] = []
         while not isinstance(item := self._next(), yaml.SequenceEndEvent):
             items.append(self._node(item, (*route, len(items))))
@@ -327,7 +346,10 @@ class _Reader:
         return Node(() if faulty else tuple(items), self._start(event), faulty=faulty)
 
     def _mapping(self, event: Any, route: Route) -> Node:
-        """A mapping; a key that is given twice is a fault, with the line of the first."""
+        """The node of a mapping that begins with `event`, at `route`.
+
+        A key that is given twice is a fault, with the line of the first.
+        """
         entries: dict[str, Node] = {}
         while not isinstance(head := self._next(), yaml.MappingEndEvent):
             key = self._key(head, route, _decimal_comma(head, entries))
@@ -341,7 +363,10 @@ class _Reader:
         return Node(entries, self._start(event))
 
     def _key(self, event: Any, route: Route, advice: str) -> str | None:
-        """The key, or None after a fault; with an advice it is none."""
+        """The key that begins with `event`, in the mapping at `route`, or None after a fault.
+
+        `advice` is the end of a message where the key shows what was meant, else "".
+        """
         is_word = isinstance(event, yaml.ScalarEvent)
         node = self._node(event, route if is_word else (*route, "?"))
         if is_word and isinstance(node.content, str) and not advice:
@@ -353,7 +378,10 @@ class _Reader:
 
 
 def _decimal_comma(event: Any, before: dict[str, Node]) -> str:
-    """`; write a decimal point: 1.5`, for the 5 in `{x: 1,5}` or in `{x:1,5}`; else ""."""
+    """`; write a decimal point: 1.5`, for the 5 in `{x: 1,5}` or in `{x:1,5}`; else "".
+
+    `event` is a key and `before` are the entries ahead of it: a comma starts a new entry.
+    """
     name, last = next(reversed(before.items()), ("", None))
     number = (last.text if last else "") or name.rpartition(":")[2]
     fraction = isinstance(event, yaml.ScalarEvent) and event.value.isdigit() and not event.style

@@ -159,7 +159,7 @@ def _items(content: Any) -> tuple[Node, ...]:
 
 
 def tree_with(key: str, node: Node, root: Node) -> Node:
-    """The tree that has nothing but a value at a key; it stands where `root` does."""
+    """The tree that has only `node`, at the key; its place is that of `root`."""
     for step in reversed(route(key)):
         node = Node({str(step): node}, node.mark)
     return replace(node, mark=root.mark)
@@ -187,8 +187,8 @@ def plain(node: Node) -> Any:
 def merge(base: Node, top: Node, *, by_kind: bool = True) -> Node:
     """`top` over `base`: mappings key by key, other values replaced.
 
-    `by_kind`: a section of another kind or preset stands in place of the base's section; where only
-    the preset differs, the kind is kept. A mapping of positions {"0": ...} over a list changes
+    With `by_kind`, a section of another kind or preset stands in place of the base's section; where
+    only the preset differs, the kind is kept. A mapping of positions {"0": ...} over a list changes
     those items only.
     """
     if _names_places(base, top):
@@ -202,6 +202,7 @@ def merge(base: Node, top: Node, *, by_kind: bool = True) -> Node:
         kind = base.content.get("kind")
         if kind and "kind" not in top.content:
             return top.with_entry("kind", kind)
+        # `kinds.merge_kept` later takes over what fits; here the models are not known.
         return replace(top, instead_of=base) if top.word("kind") != base.word("kind") else top
     entries = dict(base.content)
     for key, entry in top.content.items():
@@ -212,14 +213,16 @@ def merge(base: Node, top: Node, *, by_kind: bool = True) -> Node:
 
 
 def without_misfits(base: Node, top: Node, faults: list[Fault], at: Route = ()) -> Node:
-    """`top`, without what it has at places that lists of `base` do not have; these are faults.
+    """`top` without entries at places that lists of `base` do not have; these are faults.
 
-    A mapping with a kind replaces a list.
+    `at` leads to both. A mapping with a kind replaces a list.
     """
     entries = _items(base.content)
     if entries and top.mapping and "kind" not in top.mapping:
         strange = [key for key in top.mapping if not _is_place(key, len(entries))]
         named = any(entry.mapping for entry in entries)
+        # A list of plain values may be replaced by a mapping; an entry of sections, never by a
+        # name.
         wrong = [key for key in strange if named or key.lstrip("-").isdecimal()]
         for key in wrong:
             mark = top.mapping[key].key_mark or top.mapping[key].mark
@@ -239,7 +242,7 @@ def without_misfits(base: Node, top: Node, faults: list[Fault], at: Route = ()) 
 
 
 def entries_of(key: str, kinds: Sequence[Any]) -> str:
-    """What a list has, by the kinds of its entries, which may be None."""
+    """A sentence on what the list at `key` has; `kinds` are those of its entries, None for none."""
     last = len(kinds) - 1
     kinds_there = ", ".join(kind for kind in kinds if isinstance(kind, str))
     to = f" to {key}[{last}]" if last else ""

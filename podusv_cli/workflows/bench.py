@@ -59,12 +59,14 @@ class Benched:
 def bench(
     wanted: Selection, request: Request, progress: Progress | None = None, *, optimum: bool = False
 ) -> Benched:
-    """Simulate every law in every case and write the leaderboard; `optimum` finds that of each.
+    """Simulate every law in every case and write the leaderboard.
 
+    `optimum` finds that of each case. `progress` is called with what is done and its fraction.
     Raises UsageError (without CasADi, too, if optima are wanted), ScenarioError, LawError before
     anything is simulated, StorageError, and KeyboardInterrupt; then nothing is written.
     """
     if optimum:
+        # So that a missing library is reported before hours of runs.
         casadi()
     every = list(cases(wanted))
     folder = request.out or RESULTS / "bench"
@@ -72,6 +74,7 @@ def bench(
         extras = writer.extras
         scenarios = [scenario for case in every for scenario in case.laws.values()]
         for position, scenario in enumerate(scenarios, 1):
+            # Before the fork, so that no process compiles it again.
             scenario.ready()
             if progress:
                 progress("compiling, once", position / len(scenarios))
@@ -91,7 +94,7 @@ def bench(
 def _simulate_cases(
     every: Sequence[BenchCase], request: Request, progress: Progress | None
 ) -> Iterator[BenchRun]:
-    """The runs of all cases, in order; `progress` hears which share of the cases is done.
+    """The runs of all cases, in order; `progress` is called with the fraction of cases done.
 
     A case whose process ended is tried again law by law, to find the one that ends it.
     """
@@ -117,7 +120,7 @@ def _solve_optima(
     progress: Progress | None,
     extras: Extras,
 ) -> Iterator[Least]:
-    """The optima of all cases; what has none is added to `extras`."""
+    """The optima of all cases; one that fails is noted in `extras`. Raises KeyboardInterrupt."""
     wanted, refused = optima.wanted_optima(every, runs)
     extras.missing += [Failure("an optimum for some cases", why) for why in refused]
 
@@ -140,7 +143,10 @@ def _solve_optima(
 def _run_all(
     every: Sequence[BenchCase], request: Request, advance: Report = lambda position, fraction: None
 ) -> list[Outcome]:
-    """Play cases in processes of their own. Raises KeyboardInterrupt."""
+    """Play cases in processes of their own; `advance` is called with a case's place and fraction.
+
+    Raises KeyboardInterrupt.
+    """
     outcomes = run_all([partial(_play, case) for case in every], advance, request.workers)
     if any(outcome.interrupted for outcome in outcomes):
         raise KeyboardInterrupt("interrupted; nothing was written")

@@ -45,7 +45,11 @@ class CapabilityOfScenario:
         return [head, *map(list, zip(self.degrees, *columns, strict=True))]
 
     def least(self) -> dict[str, tuple[float, float]]:
-        """What is held from anywhere, and from where [deg] first no more is, by what thrusts."""
+        """The load that is held from every direction, and the direction [deg] that limits it.
+
+        They are listed by thrusters. Of several directions, the first that is as low within the
+        solver's accuracy.
+        """
         least = {name: float(sizes.min()) for name, sizes in self.found.held.items()}
         first = {
             name: int(np.argmax(sizes <= least[name] * (1.0 + 2.0 * ACCURACY)))
@@ -70,13 +74,14 @@ def capability(
 ) -> CapabilityOfScenario:
     """The largest `load` that is held from directions `every` degrees, written to a folder.
 
-    Raises ScenarioError, StorageError, and UsageError for a run folder, for degrees that do not
-    divide a turn, and as `theory.capability`.
+    `load` is one of LOADS by name. Raises ScenarioError, StorageError, and UsageError for a run
+    folder, for degrees that do not divide a turn, and as `theory.capability`.
     """
     if (config / "resolved.yaml").is_file():
         raise UsageError(f"{config} is a run folder; give its resolved.yaml")
     count = round(TURN / every)
     if not math.isclose(count * every, TURN):
+        # Divisors of a turn in hundredths of a degree, from 0.1 to 180 deg, for the hint.
         whole = [hundredths for hundredths in range(10, 18001) if 36000 % hundredths == 0]
         near = min(whole, key=lambda hundredths: abs(hundredths - 100.0 * every)) / 100.0
         raise UsageError(
@@ -109,7 +114,7 @@ def _check_formats(formats: Any) -> None:
 
 
 def _write(writer: RunWriter, done: CapabilityOfScenario, formats: Any) -> None:
-    """JSON, CSV, and the figure in each format."""
+    """Write the result as JSON and CSV, and its figure in each of `formats` (png, ...)."""
     from podusv_cli.figures.capability import polar  # matplotlib is slow to import
     from podusv_cli.figures.style import house_style, image
 

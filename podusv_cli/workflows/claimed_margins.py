@@ -22,9 +22,10 @@ def with_margins(
     claims: Sequence[ParsedClaim],
     extras: Extras,
 ) -> list[PastRun]:
-    """The runs; those `made` now each with those margins of its loop that claims name.
+    """The runs, each with those margins of its loop that claims name.
 
-    A finished run, and one whose loop has no margins, has none; `extras` says why.
+    `made` has the scenarios of runs made now, by label. A finished run, and one whose loop has no
+    margins, gets none; `extras` says why.
     """
     named = {pair for claim in claims for pair in _names_in_claim(claim)}
     wanted = {
@@ -43,7 +44,7 @@ def with_margins(
 
 
 def _names_in_claim(claim: ParsedClaim) -> Iterator[tuple[str, str]]:
-    """The runs and what of them stands in a claim's expressions."""
+    """Label and name for each `run.name` in a claim's expressions."""
     for tree in filter(None, (claim.expect, claim.given)):
         for node in ast.walk(tree):
             match node:
@@ -52,7 +53,10 @@ def _names_in_claim(claim: ParsedClaim) -> Iterator[tuple[str, str]]:
 
 
 def _with_margins(run: PastRun, scenario: Scenario, wanted: set[str], extras: Extras) -> PastRun:
-    """The run with those margins among its numbers that claims want, as far as there are any."""
+    """The run with the margins `wanted` (by name) among its numbers, as far as there are any.
+
+    What fails is noted in `extras`, and so is an interrupt.
+    """
     what = f"margins of {run.label}"
     if extras.interrupted:
         return run

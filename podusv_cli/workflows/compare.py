@@ -106,17 +106,20 @@ class Compared:
 def compare(items: Sequence[Path], request: Request, progress: Progress | None = None) -> Compared:
     """Simulate what is not simulated yet, and compare all runs.
 
-    Each item is a scenario (all its `controllers`, or its one controller), a run folder or the
-    folder of a comparison. The claims are those of the scenarios. After an interrupt the finished
-    runs are compared, without figures; KeyboardInterrupt if there are none. Raises UsageError,
-    ScenarioError, StorageError.
+    Each item is a scenario (all its `controllers`, or its one controller), a run folder, the folder
+    of a comparison, or a log. The claims are those of the scenarios. `progress` is called with a
+    run's label and the fraction done. After an interrupt the finished runs are compared, without
+    figures; KeyboardInterrupt if there are none. Raises UsageError, ScenarioError, StorageError.
     """
     loaded = _to_doubt(items, request) if request.doubt else None
     return compare_gathered(gather(items, request), items, request, progress, loaded)
 
 
 def _to_doubt(items: Sequence[Path], request: Request) -> Loaded:
-    """The scenario whose verdicts are doubted. Raises UsageError unless it is the only item."""
+    """The scenario whose verdicts are doubted, checked.
+
+    Raises UsageError unless it is the only item.
+    """
     from podusv_cli.doubt.check import doubt_faults  # slow to import, as much of podusv's studies
     from podusv_cli.workflows.doubt import comparison
 
@@ -126,7 +129,9 @@ def _to_doubt(items: Sequence[Path], request: Request) -> Loaded:
             f"--doubt moves the values of one scenario, and {given} is given; name that alone, or "
             "run podusv doubt on each"
         )
+    # Silent: the comparison itself opens it again, with its warnings.
     loaded = open_scenario(items[0], replace(request, warn=lambda finding: None), (doubt_faults,))
+    # Raises where there is nothing to judge, before anything is simulated.
     comparison(loaded)
     return loaded
 
@@ -138,9 +143,10 @@ def compare_gathered(
     progress: Progress | None = None,
     loaded: Loaded | None = None,
 ) -> Compared:
-    """The same for what is gathered already; `items` are the files and folders that it is from.
+    """Compare what is gathered already, as `compare` does.
 
-    `loaded` is the scenario whose verdicts are doubted, if any.
+    `items` are the files and folders that it is from. `loaded` is the scenario whose verdicts are
+    doubted, if any.
     """
     check_asked(request, [member.plugins for member in given.members])
     _check_metrics(request, given.members)
@@ -178,7 +184,7 @@ def compare_gathered(
 
 
 def _check_metrics(request: Request, members: Sequence[Member]) -> None:
-    """UsageError for a metric that no run has."""
+    """Raise UsageError for a metric in the request that no run has."""
     logged = (name for member in members if member.folder for name in member.folder.metrics)
     plugged = (name for member in members for name in metrics_with(member.plugins))
     own = (name for member in members for name in member.about.metrics)
@@ -189,7 +195,7 @@ def _check_metrics(request: Request, members: Sequence[Member]) -> None:
 
 
 def _keep_apart(items: Sequence[Path], target: Path) -> None:
-    """UsageError where writing the comparison would touch a run that it compares."""
+    """Raise UsageError where writing the comparison would touch a run that it compares."""
     there = Path(os.path.realpath(target))
     for item in items:
         here = Path(os.path.realpath(item))
@@ -215,8 +221,12 @@ def sizes(members: Sequence[Member]) -> list[Size]:
 def make_runs(
     members: Sequence[Member], folder: Path, request: Request, progress: Progress | None = None
 ) -> dict[str, Outcome]:
-    """Execute the members that have no run yet, in parallel, each into a folder in `folder`."""
+    """Execute the members that have no run yet, in parallel, each into a folder in `folder`.
+
+    The outcomes by label; `progress` is called with a label and the fraction done.
+    """
     wanted = [(member, member.case) for member in members if member.case]
+    # Imports, versions and compiled code, so that each process finds them done.
     with interrupts_enabled():  # once, before the forks
         provenance.surroundings()
         import_module("podusv_cli.storage.log_reader")
@@ -253,7 +263,8 @@ def collect(
 ) -> outputs.Result:
     """Open the runs and compare them; a law's cost or a verdict that fails is noted in `extras`.
 
-    What the runs lack is missing in the comparison, too.
+    `outcomes` are those of runs made now, by label, `parsed` the claims. What the runs lack is
+    missing in the comparison, too.
     """
     finished = {label: o.result for label, o in outcomes.items() if o.result is not None}
     folders = {m.label: m.folder for m in members if m.folder}
@@ -275,6 +286,7 @@ def collect(
     runs = _with_departures(runs, members)
     scenarios = {label: case.scenario for label, case in made.items()}
     runs = with_margins(runs, scenarios, parsed, extras)
+    # A run without a log, as one that crashed, has no numbers.
     every = {m.label: PastRun.without_log(m.label, m.about, endings[m.label]) for m in members}
     every |= {run.label: run for run in runs}
     numbers = {label: run.compared_metrics() for label, run in every.items()}
@@ -301,7 +313,10 @@ def collect(
 
 
 def _place_measured(members: Sequence[Member], runs: Sequence[PastRun]) -> list[Member]:
-    """The members; what was measured where it is to stand, with what the runs show of it."""
+    """The members, with a measured track placed beside the first run.
+
+    The track's remarks say how it fits.
+    """
     logs = {run.label: run.recording for run in runs if len(run.recording["time"])}
     done = [_done_after(m.about, logs[m.label]) for m in members if m.label in logs]
     placed = []
@@ -311,6 +326,7 @@ def _place_measured(members: Sequence[Member], runs: Sequence[PastRun]) -> list[
             remarks = member.track.beside_run(label, first)
             track = member.track.place_beside(label, first)
             remarks = [*track.remarks, *remarks]
+            # Up to when the last run has done its path: then the log counts no longer, either.
             about = track.about(member.about, max(done))
             member = replace(member, track=track, noticed=remarks, about=about)
         placed.append(member)
@@ -318,19 +334,22 @@ def _place_measured(members: Sequence[Member], runs: Sequence[PastRun]) -> list[
 
 
 def _done_after(about: RunAbout, log: Recording) -> float:
-    """When a run has done its path [s], or ends before; infinite for a path without an end."""
+    """When a run has done its path or ends before [s]; infinite for a path without an end."""
     return float(log.up_to(about.path_end)["time"][-1]) if about.path_end else math.inf
 
 
 def _as_finished_runs(members: Sequence[Member], runs: Sequence[PastRun]) -> list[PastRun]:
-    """What was measured as a run, with the target of the first of the others that has a log."""
+    """Measured tracks as runs, with the target of the first of `runs` that has a log."""
     logs = (run.recording for run in runs)
     first = next((log for log in logs if len(log["time"])), None)
     return [m.track.beside(first, m.label, m.about) for m in members if m.track and first]
 
 
 def _with_departures(runs: Sequence[PastRun], members: Sequence[Member]) -> list[PastRun]:
-    """The runs; the simulated ones with how far they are from the measured track, if any."""
+    """The runs, with distances from the measured track, if there is one.
+
+    Only simulated runs have these distances.
+    """
     measured = {m.label: m.track for m in members if m.track}
     return [
         replace(run, cost={**run.cost, **track.departures(run.counted_recording)})
@@ -346,10 +365,10 @@ def _meanings(plugins: Plugins) -> dict[str, str]:
 
 
 def _with_costs(runs: Sequence[PastRun], made: Mapping[str, Case], extras: Extras) -> list[PastRun]:
-    """The runs; those `made` now with the laws' cost measured here and now, side by side.
+    """The runs, those `made` now with their laws' cost, measured here and now, side by side.
 
     The cost in a run's own metrics was measured at another time, perhaps on another machine, so it
-    is never compared; and a finished run is looked at without its law.
+    is never compared. A finished run gets none, as it is looked at without its law.
     """
     timed = [
         run
@@ -373,7 +392,10 @@ def _add_report(
     progress: Progress | None,
     request: Request,
 ) -> None:
-    """Draw the figures that are asked for, and write the report, which has them as PNG."""
+    """Draw the figures that are asked for, and write the report, which has them as PNG.
+
+    `origin` is the provenance of the comparison; what fails is noted in `extras`.
+    """
     figures: dict[str, bytes] = {}
     if request.figures:
         draw = partial(
@@ -381,6 +403,7 @@ def _add_report(
         )
         figures = extras.attempt("figures", partial(draw, request.workers)) or {}
     for name, content in figures.items():
+        # PNGs for the report alone are no files.
         if name.partition(".")[2] in request.formats:
             writer.add(f"figures/{name}", content)
     heading = f"{title} (interrupted)" if extras.interrupted else title

@@ -43,9 +43,10 @@ class Differences:
 def diff(one: Path, other: Path) -> Differences:
     """Compare a run with another, or the runs of a comparison with those of the same name.
 
-    Raises UsageError where one is no run folder, and StorageError.
+    Both are folders. Raises UsageError where one is no run folder, and StorageError.
     """
     sides = [_runs(path) for path in (one, other)]
+    # Two single runs are compared whatever their names.
     if all(len(runs) == 1 for runs in sides):
         return Differences({"": _pair(sides[0][0], sides[1][0])})
     ours, theirs = ({run.path.name: run for run in runs} for runs in sides)

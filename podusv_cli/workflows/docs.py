@@ -45,11 +45,15 @@ class Section:
         return _plain(self.heading)
 
     def score(self, words: Sequence[re.Pattern[str]]) -> int:
-        """How well the section answers; 0 where a word is missing."""
+        """How well the section answers a search for `words`; 0 where a word is missing.
+
+        All words in a page's name count most, then those in its title or a heading, then the text.
+        """
         if not all(word.search(f"{self.heading}\n{self.text}") for word in words):
             return 0
         named = self.level == 1 and all(word.search(self.page) for word in words)
         headed = all(word.search(self.heading) for word in words)
+        # The rarest word decides, and no page wins by its length alone (MOST).
         count = min(len(word.findall(self.text)) for word in words)
         weight = IN_TITLE if self.level == 1 else IN_HEADING
         return IN_NAME * named + weight * headed + min(count, MOST)
@@ -69,6 +73,7 @@ def contents() -> dict[str, dict[str, str]]:
     for line in (shipped.folder("docs") / CONTENTS).read_text("utf-8").splitlines():
         if begun := CAPTION.match(line):
             caption = begun[1]
+        # Pages that are made for the site have no file in a checkout.
         elif (entry := ENTRY.match(line)) and _file(entry[1]).is_file():
             captions.setdefault(caption, {})[entry[1]] = sections(entry[1])[0].title
     return captions
@@ -111,7 +116,7 @@ def is_page(name: str) -> bool:
 def search(text: str) -> list[tuple[Section, str]]:
     """Sections that have all words of a text, the best first, each with a line of it.
 
-    Raises UsageError where there is none.
+    Words count where they begin as asked, in any case. Raises UsageError where there is none.
     """
     words = [re.compile(rf"\b{re.escape(word)}", re.IGNORECASE) for word in text.split()]
     scored = [(part.score(words), part) for name in names() for part in sections(name)]
@@ -151,7 +156,10 @@ def _name_shipped(file: re.Match[str]) -> str:
 
 
 def _reachable(link: re.Match[str], folder: str) -> str:
-    """A link to where a reader without a checkout gets; its words alone where there is nothing."""
+    """A link that leads somewhere without a checkout too; its words alone where nothing is there.
+
+    `folder` is that of the page in a checkout. Pages become `podusv docs`, examples `podusv init`.
+    """
     picture, words, target = link.groups()
     if picture:
         return f"[figure: {words}]"

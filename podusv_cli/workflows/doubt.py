@@ -56,7 +56,7 @@ def doubt(config: Path, request: Request, progress: Progress | None = None) -> o
 
 
 def doubt_of(loaded: Loaded, request: Request, progress: Progress | None = None) -> outputs.Doubted:
-    """The same for a scenario that is loaded and checked."""
+    """As `doubt`, for a scenario that is loaded and checked and whose claims are on runs."""
     scenario, world = loaded.scenario, comparison(loaded)
     target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with interrupts_deferred(), writer_of(request, target) as writer:
@@ -77,7 +77,11 @@ class Subject:
 
 
 def comparison(loaded: Loaded) -> Subject:
-    """What there is to judge. Raises UsageError without claims, ScenarioError for a bad hull."""
+    """The claims to judge, the laws in them, and the same laws on other hulls.
+
+    Claims on measured times are left out, since these change with every run. Raises UsageError
+    without claims, ScenarioError for a hull that is none.
+    """
     parsed = [claim for claim in parse_claims(loaded) if not claims.is_timed(claim.claim)]
     if not parsed:
         raise UsageError(
@@ -103,7 +107,7 @@ def comparison(loaded: Loaded) -> Subject:
 def report_doubt(
     subject: Subject, scenario: Scenario, request: Request, progress: Progress | None
 ) -> tuple[DoubtReport, bool]:
-    """All that is tried, and what it says of every claim; whether an interrupt ended it."""
+    """What every verdict depends on, and whether an interrupt ended the search."""
     cases = {label: Case.of(single) for label, single in subject.singles.items()}
     for case in cases.values():
         examine(case)
@@ -117,6 +121,7 @@ def report_doubt(
     moving = choices(subject.singles, asked)
     parsed = {claim.name: claim.claim for claim in subject.parsed}
     tried = search(parsed, moving, judge, asked, request.workers, progress)
+    # An interrupted search gives back what it has, which is then shorter.
     interrupted = (len(tried.alone), len(tried.worlds)) != (len(moving), asked.draws)
     verdicts = [
         RunsVerdict(
@@ -132,7 +137,7 @@ def report_doubt(
 
 
 def judging(subject: Subject, runs: Mapping[str, PastRun]) -> Judge:
-    """What judges the claims in a world; `runs` are those that a world does not move."""
+    """A function that judges the claims in a world; `runs` are those of the scenario as it is."""
 
     def judge(world: World) -> Judged:
         """Answers and numbers of all claims where the world's values are put in.
@@ -158,7 +163,10 @@ def judging(subject: Subject, runs: Mapping[str, PastRun]) -> Judge:
 
 
 def _change_scenario(subject: Subject, label: str, world: World) -> Scenario:
-    """The scenario of the law `label` in a world; a drawn hull first, single values over it."""
+    """The scenario of the law `label` in a world: another hull first, then single values over it.
+
+    Raises ValueRefused where the scenario cannot take a value.
+    """
     new = {at: value for (law, at), value in world.items() if law == label}
     hull = new.pop(HULL, None)
     single = (subject.hulls[hull] if hull else subject.singles)[label]
@@ -166,7 +174,7 @@ def _change_scenario(subject: Subject, label: str, world: World) -> Scenario:
 
 
 def _simulate_in_memory(label: str, case: Case, parsed: Sequence[ParsedClaim]) -> PastRun:
-    """A run in memory, with what a comparison adds to it that these claims name."""
+    """A run in memory with all metrics that `parsed` claims may name; `label` names it."""
     recording = to_end(case.plan, compiled=case.scenario.simulation.compiled)
     whole, _ = add_derived(case, recording)
     numbers = summary(case, recording, Extras())

@@ -40,7 +40,11 @@ class Studies:
     request: Request
 
     def judge(self, name: str, new: list[str]) -> tuple[Judged, list[StudyVerdict]]:
-        """The verdicts of the study with new values; what is there already is not made again."""
+        """The answers of the study with new values, and its verdicts; what was made before is kept.
+
+        `name` is its folder's, `new` are values as `--set` takes them. A study that cannot be made
+        is a failed one.
+        """
         own = Request(
             overrides=[*self.request.overrides, NO_LOGS, *new],
             out=self.folder / "studies" / name,
@@ -75,7 +79,8 @@ def doubt_study(
     """Move what a study does not draw, one value at a time, and judge its claims anew.
 
     Every study stays in the folder, so that an interrupted search goes on where it was. Raises
-    ScenarioError, StorageError.
+    ScenarioError, StorageError, PodusvError where the study as it is cannot be made, and
+    KeyboardInterrupt.
     """
     scenario = loaded.scenario
     folder = request.out or RESULTS / f"{scenario.name}-doubt"
@@ -94,6 +99,7 @@ def doubt_study(
         raise KeyboardInterrupt(
             f"interrupted; the studies that are made are kept, continue with: {again}"
         ) from stop
+    # No draws of all choices at once: each would be a study.
     tried = Tried(base, alone, Draws((), np.zeros((0, 0)), ()), ())
     report = DoubtReport(scenario, answers(verdicts, tried), tried)
     with RunWriter(folder / "answer", force=True, argv=request.argv) as writer:

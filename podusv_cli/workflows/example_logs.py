@@ -26,7 +26,10 @@ COLUMNS = {
 
 
 def write(config: Path, wanted: Identify) -> list[Path]:
-    """The logs that a copy of the example names, beside it; those that are there stay."""
+    """Write the logs that a copy of the example names, beside it; those that are there stay.
+
+    `config` is the copy, and `wanted` its section `identify`. Returns the files that are new.
+    """
     laws = load(MANOEUVRES).scenario.singles()
     paths = [config.with_name(log.file) for log in wanted.logs]
     missing = [path for path in paths if not path.exists()]
@@ -39,6 +42,7 @@ def _log(single: Scenario) -> str:
     single.ready()
     recording = to_end(single.plan())
     columns = [
+        # A signal with a column for each propeller.
         (recording[name] if place is None else recording[name][:, place]) * factor
         for name, place, factor in COLUMNS.values()
     ]

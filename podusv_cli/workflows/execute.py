@@ -52,7 +52,7 @@ class Stopwatch:
 
     @contextmanager
     def part(self, name: str) -> Iterator[None]:
-        """Add what happens inside to `<name>_s`."""
+        """Add the time [s] that passes inside to `<name>_s`."""
         start = time.perf_counter()
         try:
             yield
@@ -121,12 +121,12 @@ def execute(
     watch: Stopwatch | None = None,
     case: Case | None = None,
 ) -> Finished:
-    """Simulate, measure, write, draw; `target` is there only when all of it is.
+    """Simulate, measure, write and draw a run.
 
-    `case` is the task's scenario with its plan, where it was looked at before.
-
-    A run that diverges or is interrupted is written like any other; its status tells. An interrupt
-    after the simulation costs the figures or the law's cost, nothing else; what fails after it is
+    The folder `target` appears only when all is written. `case` is the task's scenario with its
+    plan, where it was looked at before; `watch` adds up the time of each part. A run that diverges
+    or is interrupted is written like any other; its status says so. An interrupt after the
+    simulation costs the figures or the law's cost, nothing else. What fails after the simulation is
     left out, and missing.json says why. Raises StorageError.
     """
     watch, case = watch or Stopwatch(), case or Case.of(task.scenario)
@@ -142,6 +142,7 @@ def execute(
         ) as writer,
     ):
         long = size.content > task.held and not task.scenario.log.compress
+        # A long log that is not compressed lies on the disk from the start, not in memory.
         allocate = partial(files.disk_array, writer.folder) if long else np.empty
         recording = simulate_case(case, watch, progress, allocate, task.compiling)
         extras = writer.extras
@@ -158,6 +159,7 @@ def execute(
         with watch.part("write"):
             whole = _write_log(writer, case, whole, again=long)
         with watch.part("metrics"):
+            # After the log is written: findings then read its signals one by one, see `_write_log`.
             noticed = extras.make_or_record("warnings", lambda: postflight(task.scenario, whole))
         warnings = *task.noticed, *(noticed or ())
         with watch.part("write"):
@@ -197,8 +199,8 @@ def execute(
 def why_unwritten(outcomes: Iterable[Outcome]) -> str:
     """Why a run could not be written, "" where none failed for that.
 
-    A result without such a run is not worth an older one's place. Raises StorageError where there
-    is no run at all.
+    A result without such a run must not replace an older one. Raises StorageError where there is no
+    run at all.
     """
     outcomes = tuple(outcomes)
     causes = [o.failure for o in outcomes if o.code == StorageError.exit_code]
@@ -220,7 +222,7 @@ def warm_up(case: Case, compiling: Progress | None = None) -> None:
 
 
 def examine(case: Case) -> list[Finding]:
-    """The findings about a scenario whose figures, law and path are asked before.
+    """The findings about a scenario before its run; figures' names and the law are checked first.
 
     Raises LawError.
     """
@@ -236,7 +238,11 @@ def simulate_case(
     allocate: Allocate = np.empty,
     compiling: Progress | None = None,
 ) -> Recording:
-    """Simulate a scenario, with the probe of its metrics; `allocate` as `simulate` has it."""
+    """Simulate a scenario with the probe of its metrics; `watch` adds up compiling and simulating.
+
+    `progress` and `compiling` are called with the fraction done. `allocate` makes the log's arrays,
+    as `simulate` says.
+    """
     with watch.part("compile"), interrupts_enabled():
         warm_up(case, compiling)
     compiled = case.scenario.simulation.compiled
@@ -245,7 +251,10 @@ def simulate_case(
 
 
 def check_figures(scenario: Scenario) -> None:
-    """LawError where a plug-in's figure has the name of another, before anything is simulated."""
+    """Raise LawError where a plug-in's figure has the name of another.
+
+    This is asked before anything is simulated.
+    """
     if scenario.plugged:
         from podusv_cli.figures.drawing import figures_with  # matplotlib is slow to import
 
@@ -253,7 +262,10 @@ def check_figures(scenario: Scenario) -> None:
 
 
 def summary(case: Case, recording: Recording, extras: Extras) -> dict[str, float]:
-    """The metrics of a run that the probe saw; those that raise are missing among the extras."""
+    """The metrics of a run by name: those that its probe gathered, and those computed from the log.
+
+    One that raises is noted in `extras`.
+    """
     seen, counted = recording.seen, recording.up_to(case.plan.loop.passed_by(1.0))
     numbers = case.plan.probe.summary(seen, extras.note) if seen is not None else {}
     for name, metric in case.scenario.known_metrics().items():
@@ -276,9 +288,9 @@ def _cost(case: Case, recording: Recording) -> dict[str, float]:
 def add_derived(
     case: Case, recording: Recording, allocate: Allocate = np.empty
 ) -> tuple[Recording, dict[str, Any]]:
-    """The recording with places on earth and what the stability monitor adds, and its findings.
+    """The recording with places on earth and the stability monitor's signals, and its theory.json.
 
-    No places without an origin; nothing of the monitor without V.
+    No places without an origin; nothing of the monitor ({}) without V. `allocate` makes arrays.
     """
     plan, scenario = case.plan, case.scenario
     monitored_run = scenario.log.monitor and monitor.monitor_recording(
@@ -298,10 +310,11 @@ def add_derived(
 def _write_log(
     writer: folder.RunWriter, case: Case, recording: Recording, *, again: bool
 ) -> Recording:
-    """Write log and scenario; the recording, `again` with its signals as they lie in the log.
+    """Write log and scenario, and return the recording.
 
-    There each signal is in one piece. The march leaves them row by row, so that whoever looks at
-    one signal of a long log there reads all others from the disk, too.
+    If `again`, its signals are as read from the log, where each is in one piece. The march leaves
+    them row by row, so that reading one signal of a long log would read all others from the disk,
+    too.
     """
     from podusv_cli.storage import log, log_reader  # h5py is slow to import
 

@@ -38,7 +38,10 @@ class Products:
 
 
 def export(config: Path, request: Request, products: Products = Products()) -> Path:
-    """Write the law into a folder. Raises ScenarioError, UsageError, LawError, StorageError."""
+    """Write the law of a scenario into a folder, as `products` says; the folder.
+
+    Raises ScenarioError, UsageError, LawError, StorageError.
+    """
     platforms, linked = _platforms(products), _linkable_platforms(products) if products.fmu else {}
     too_large = limits(allow_large=False)
     checks, plugged = (unknown_codes, too_large), of_files(request.trust)
@@ -47,6 +50,7 @@ def export(config: Path, request: Request, products: Products = Products()) -> P
     )
     scenario = single(loaded, request.controller)
     law = ExportedLaw.of(scenario)
+    # The exported law's scenario logs every step, so it may be too large where this one is not.
     if too_large(replace(loaded, scenario=law.scenario)):
         raise UsageError(
             f"{scenario.name}: the run that an exported law is checked against logs every step, "
@@ -61,6 +65,7 @@ def export(config: Path, request: Request, products: Products = Products()) -> P
         law.scenario.ready()
         run = to_end(law.plan, compiled=law.scenario.simulation.compiled)
         seen = law.samples(run)
+        # What the law answers outside of the loop, which users check their code against.
         samples = law.by_itself(seen)
         of_run = np.array_equal(samples, seen)
         for note in _notes(law, run, of_run):
@@ -92,7 +97,10 @@ def _platforms(products: Products) -> Sequence[str]:
 
 
 def _notes(law: ExportedLaw, run: Recording, of_run: bool) -> Iterator[str]:
-    """What somebody should know of the run and of the law by itself."""
+    """Sentences that a user needs on the run and on the law by itself.
+
+    `of_run` says whether both gave the same demands.
+    """
     if run.status != "finished":
         yield f"the run {run.message}; {SAMPLES} has the samples before"
     if law.needs_loads:
@@ -110,7 +118,7 @@ def _notes(law: ExportedLaw, run: Recording, of_run: bool) -> Iterator[str]:
 
 
 def _linkable_platforms(products: Products) -> Mapping[str, objects.Platform]:
-    """The platforms of the FMU. Raises UsageError for one without libraries or a linker."""
+    """The platforms of the FMU by name. Raises UsageError for one without libraries or a linker."""
     names = products.platforms or (this_machine(),)
     if "" in names:
         raise UsageError(

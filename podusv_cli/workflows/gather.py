@@ -47,7 +47,10 @@ class Members:
 
 
 def gather(items: Sequence[Path], request: Request) -> Members:
-    """Open every argument. Raises UsageError, ScenarioError, StorageError."""
+    """Open every argument: scenarios, run folders, comparisons and at most one log.
+
+    Raises UsageError, ScenarioError, StorageError.
+    """
     if request.overrides and all(item.is_dir() or is_log(item) for item in items):
         given = ", ".join(request.overrides)
         raise UsageError(
@@ -60,7 +63,10 @@ def gather(items: Sequence[Path], request: Request) -> Members:
 
 
 def gather_logs(logs: Sequence[Path], groups: Sequence[Members], align: str = "") -> list[Members]:
-    """A log among the arguments as the last of all runs. Raises UsageError."""
+    """The log among the arguments, as the last of all runs; none without `logs`.
+
+    `groups` are the other arguments, opened; `align` says how it is moved. Raises UsageError.
+    """
     if not logs:
         if align:
             raise UsageError(f"--align {align}: no log is given that could be moved; name one")
@@ -77,6 +83,7 @@ def gather_logs(logs: Sequence[Path], groups: Sequence[Members], align: str = ""
             "for the place alone, or leave it out"
         )
     members = [member for group in groups for member in group.members]
+    # A finished run does not say how fast its boat may go.
     speeds = [member.case.scenario.facts.U if member.case else math.inf for member in members]
     sections = [group.identify for group in groups if group.identify]
     plane = _common_plane(members)
@@ -89,7 +96,10 @@ def gather_logs(logs: Sequence[Path], groups: Sequence[Members], align: str = ""
 
 
 def _common_plane(members: Sequence[Member]) -> Plane | None:
-    """Where the runs are on earth, None where nobody says. Raises UsageError where they differ."""
+    """The plane of the runs on earth; None where none has an origin.
+
+    Raises UsageError where origins differ, or only some runs have one.
+    """
     planes = {plane: member.label for member in members if (plane := plane_of(member.about))}
     if len(planes) > 1:
         places = "; ".join(f"{label}: {p.lat:g}, {p.lon:g} deg" for p, label in planes.items())
@@ -106,7 +116,7 @@ def _common_plane(members: Sequence[Member]) -> Plane | None:
 
 
 def _check_common(log: Track, duration: float) -> None:
-    """Raises UsageError where too few instants are common with a run of this duration [s]."""
+    """Raise UsageError where fewer than FEWEST instants lie within a run of this duration [s]."""
     count, first, last = int(log.common(BEGIN, duration).sum()), log.times[0], log.times[-1]
     if count >= FEWEST:
         return
@@ -119,14 +129,16 @@ def _check_common(log: Track, duration: float) -> None:
 
 
 def _about_unit(times: Vector, duration: float) -> str:
-    """What to write where the numbers of a clock, `times` (n,), are no seconds; else "".
+    """What to write where the numbers of a clock, `times` (n,), are not in seconds; else "".
 
-    They tell by dates, by a span that fits the run in another unit, or by the distance of rows.
+    Signs are dates, a span that would fit the run in another unit, and the distance of rows.
+    `duration` [s] is that of the run.
     """
     from podusv_cli.identify.logs.checks import FINER, SLOWEST  # h5py is slow to import
 
     span, step = float(times[-1] - times[0]), float(np.median(np.diff(times)))
     dated = [unit for unit, f in FINER.items() if DATED[0] <= times[0] * f <= DATED[1]]
+    # More than a second, so that a unit is not guessed for a log that is too short in any.
     finer = [
         unit
         for unit, f in FINER.items()
@@ -146,7 +158,7 @@ def _about_unit(times: Vector, duration: float) -> str:
 
 
 def _about_clock(log: Track, duration: float) -> str:
-    """What to do where a log in seconds hardly has an instant of the run."""
+    """What to do where a log in seconds has too few instants within a run of this duration [s]."""
     if (
         not log.aligned
         and replace(log, aligned=START).start_clock_at(BEGIN).common(BEGIN, duration).sum()
@@ -160,9 +172,10 @@ def _about_clock(log: Track, duration: float) -> str:
 
 
 def join_members(groups: Sequence[Members]) -> Members:
-    """All of several, each run with a label of its own, and with the claims about them."""
+    """All runs and claims of several groups, each run with a label of its own."""
     members = distinct(member for group in groups for member in group.members)
     labels = iter(member.label for member in members)
+    # For each group: its claims' names for runs, and the labels these have now.
     called = [dict(zip(group.names, labels, strict=False)) for group in groups]
     title = "-".join(dict.fromkeys(group.name for group in groups))[:80]
     return Members(title, members, claims=_label_claims(groups, called))
@@ -188,6 +201,7 @@ def from_folder(path: Path, files: Sequence[str] = ()) -> Members:
 def from_scenario(loaded: Loaded, *, alone: bool) -> Members:
     """The runs of a scenario, and its claims; `alone` says that nothing else is compared."""
     scenario, singles = loaded.scenario, loaded.scenario.singles()
+    # Beside others, a scenario with one law is called by its own name, not its law's.
     labels = list(singles) if alone or scenario.controllers else [scenario.name]
     members = [
         Member(
@@ -208,7 +222,10 @@ def from_scenario(loaded: Loaded, *, alone: bool) -> Members:
 def _label_claims(
     groups: Sequence[Members], called: Sequence[Mapping[str, str]]
 ) -> list[ParsedClaim]:
-    """All claims; names that several scenarios use are preceded by the scenario's name."""
+    """All claims with the runs' labels; `called` maps a group's names for runs to labels.
+
+    A claim whose name several scenarios use has the scenario's name in front.
+    """
     counts = Counter(claim.name for group in groups for claim in group.claims)
     claims = [
         replace(claim.with_labels(labels), name=f"{group.name}.{claim.name}")

@@ -10,7 +10,7 @@ from podusv_cli.workflows.execute import Stopwatch, add_derived, simulate_case, 
 
 
 def run_in_memory(case: Case) -> PastRun:
-    """Simulate a case; what of its metrics cannot be computed is one of its warnings.
+    """Simulate a case without a folder; a metric that cannot be computed becomes a warning.
 
     Its law's cost is not measured. Raises LawError.
     """

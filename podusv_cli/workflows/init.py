@@ -70,7 +70,7 @@ def init(name: str, out: Path | None = None) -> Begun:
 
 
 def _scenario(name: str, out: Path | None) -> Begun:
-    """Write a shipped scenario, its schema and example logs where the user wants them."""
+    """Copy a shipped scenario, with its schema and example logs, to `out` or the current folder."""
     source = f"{shipped.PREFIX}{name}.yaml"
     config = out or Path(f"{name}.yaml".rpartition("/")[2])
     schema = config.with_name(SCHEMA)
@@ -78,6 +78,7 @@ def _scenario(name: str, out: Path | None) -> Begun:
     _check_free(config)
     _spare(schema)
     text = own_copy(source)
+    # The copy is loaded where it will lie, before it is written.
     scenario = load_text(text, str(config)).scenario
     files.make_folder(config.parent)
     plugins = installed_plugins()
@@ -89,7 +90,7 @@ def _scenario(name: str, out: Path | None) -> Begun:
 
 
 def _example(name: str, out: Path | None) -> Begun:
-    """A folder or notebook; links of a README to pages, which a checkout has, become words."""
+    """Copy a folder or notebook; a README's links into a checkout become words."""
     given = texts(name)
     root = out or Path(Path(next(iter(given))).parts[0])
     _check_free(root)
@@ -124,10 +125,11 @@ def _command(scenario: Scenario) -> tuple[str, ...]:
 
 
 def own_copy(source: str) -> str:
-    """A shipped scenario's text as a file anywhere: files that it names are named in full."""
+    """A shipped scenario's text that loads from anywhere: files that it names are named in full."""
     text = _text(source)
     lines = text.splitlines(keepends=True)
     node = read(text, source, [])
+    # From the end, so that the places of earlier ones stay right.
     for scalar in reversed(_scalars(node) if node else []):
         whole = shipped.relative_to(source, str(scalar.content))
         if whole in shipped.all_files():

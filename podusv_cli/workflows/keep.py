@@ -26,12 +26,16 @@ def scenario_of_draw(plan: StudyPlan, law: str, cell: int, draw: int) -> Scenari
     """The scenario of one run of a study, under a name of its own."""
     (numbers,) = draws(plan.sweep, draw, 1)
     single = draw_scenario(plan.single(law, cell), plan.sweep.vary, numbers)
+    # Long names are cut, so that the whole fits the limit.
     end = f"-{KeptRun(law, cell, draw, '').name}"
     return single.model_copy(update={"name": f"{single.name[: LONGEST_NAME - len(end)]}{end}"})
 
 
 def seen_from(place: Path, study: Path, scenario: Scenario) -> Scenario:
-    """A scenario of a study, with its plug-in files named as in another folder."""
+    """A scenario of a study, with its plug-in files named as from the folder `place`.
+
+    `study` is the folder of the study, which keeps the files.
+    """
     kept = scenario.plugin_files()
     names = {name: relative_path(study / name, place) for name in kept}
     plugins = {names.get(name, name): required for name, required in scenario.plugins.items()}
@@ -43,12 +47,12 @@ def keep(
 ) -> list[Kept]:
     """Make those kept runs that are not there yet; all of them, compared with the table.
 
-    A run that fails is missing among the `extras`. Raises StorageError only for what is not about
-    one run.
+    A run that fails is noted in `extras`. Raises StorageError only for what is not about one run.
     """
     missing = missing_runs(folder, results)
     tasks = [_task(folder, plan, run, request) for run in missing]
     with interrupts_enabled():
+        # Compiled here, once, before the processes fork.
         for law, cell in dict.fromkeys((run.law, run.cell) for run in missing):
             warm_up(Case(plan.single(law, cell), plan.run_plan(law, cell)))
     outcomes = run_all([partial(execute, task) for task in tasks], workers=request.workers)

@@ -67,7 +67,7 @@ Moved = Mapping[str, float | str]  # values by key
 class Base:
     """A scenario that is loaded, into which numbers are put while values move.
 
-    `has_nominal`: the file gives what the laws are told of the hull. `several`: it has
+    `has_nominal`: the file says what the laws assume of the hull. `several`: it has
     `controllers`. `unread` are sentences about claims that these laws have no signals for.
     """
 
@@ -115,16 +115,20 @@ class Live:
         return [f"controllers={json.dumps({label: plain(loaded.root.mapping['controller'])})}"]
 
     def singles(self, scenario: Scenario) -> dict[str, Scenario]:
-        """The scenario of each law that is shown, by label. Raises UsageError."""
+        """The scenario of each law that is shown, by label.
+
+        Raises UsageError for an unknown law.
+        """
         known = scenario.singles()
         for law in self.laws:
             if law not in known:
                 raise UsageError(unknown_word(f"controller {law!r}", law, known))
+        # Laws that the page added are always shown.
         added = [label for label in known if label not in self._labels]
         return {law: known[law] for law in [*self.laws, *added] or known} if self.laws else known
 
     def controls(self, scenario: Scenario) -> list[Knob]:
-        """All that may be moved."""
+        """All knobs of the scenario; their keys and words are noted as offered to the page."""
         several = scenario.controllers
         laws = (
             [f"controllers.{law}" for law in self.singles(scenario)] if several else ["controller"]
@@ -134,7 +138,10 @@ class Live:
         return found
 
     def answer(self, name: str, asked: Mapping[str, Any]) -> dict[str, Any]:
-        """What the page asks for; what podusv refuses as `refused`, sentences by key."""
+        """The answer to a question `name` of the page with its arguments `asked`.
+
+        What podusv refuses is returned as `refused`: sentences by key.
+        """
         answers: dict[str, Callable[..., dict[str, Any]]] = {
             "frame": self.frame,
             "margins": self.margins,
@@ -150,6 +157,7 @@ class Live:
             return answers[name](moved, *(asked[key] for key in QUESTIONS[name][1:]))
         except ScenarioError as error:
             faults = [fault for fault in error.faults if isinstance(fault, Fault)]
+            # A kind that was chosen may need numbers, which the page may then send.
             self.offered |= {
                 f.key: () for f in faults if f.text.startswith("missing; must be a number")
             }
@@ -161,9 +169,10 @@ class Live:
             return _refusal(f"{in_a_line(error)}; the terminal has more")
 
     def check_offered(self, moved: Mapping[str, Any]) -> Moved:
-        """Numbers and words at keys that the page was offered. Raises UsageError for others.
+        """The values moved, if they are among those that the page was offered. Raises UsageError.
 
-        So no page can name a plug-in or a file. Of a shared address, kinds come before their keys.
+        So no page can name a plug-in or a file. An empty offer stands for a number. In a shared
+        address kinds come before their keys: these are loaded first, and then offer theirs.
         """
         if not moved.keys() <= self.offered.keys():
             kinds = {key: kind for key, kind in moved.items() if key.endswith(".kind")}
@@ -180,10 +189,11 @@ class Live:
     def frame(
         self, moved: Moved, signals: Sequence[str], rest: bool, wanted: bool
     ) -> dict[str, Any]:
-        """Tracks, curves and numbers; at rest also findings, with `wanted` the controls too.
+        """Tracks, curves and numbers for the page.
 
-        At rest the scenario is loaded as `podusv run` does it. While values move, numbers are put
-        into one that is loaded already, as draws of a study are.
+        At rest (`rest`) the scenario is loaded as `podusv run` does it, and findings are added;
+        with `wanted`, the knobs too. While values move, numbers are put into a scenario that is
+        loaded already, as draws of a study are. `signals` are those of the curves.
         """
         began = time.thread_time()
         if rest or wanted:
@@ -236,11 +246,15 @@ class Live:
         return told | {"cpu": time.thread_time() - began}
 
     def _recordings(self, cases: Mapping[str, Case], rest: bool) -> dict[str, Recording]:
-        """A run of each law, several at once; one whose own values did not move keeps its run."""
+        """A run of each law by label, several at once.
+
+        A law whose own values did not move keeps its run.
+        """
         compiled = next(iter(cases.values())).scenario.simulation.compiled
         if rest:
             for case in cases.values():
                 warm_up(case)
+        # A frozen case holds its run in its own dictionary, as `cached_property` does.
         missing = [case for case in cases.values() if rest or "run" not in vars(case)]
         for case, recording in zip(
             missing, run_together([case.plan for case in missing], compiled=compiled), strict=True
@@ -257,7 +271,7 @@ class Live:
         return {"margins": {label: margins_of(case) for label, case in cases.items()}}
 
     def report(self, moved: Moved) -> dict[str, Any]:
-        """The report of what is shown, in a folder of results as `podusv compare` makes it."""
+        """The report of what is shown, made as `podusv compare` does it: its file and its HTML."""
         request = Request(
             self.assignments(moved),
             plugins=self.files,
@@ -272,7 +286,7 @@ class Live:
         return {"file": str(page.resolve()), "page": page.read_text("utf-8")}
 
     def _base_of(self, loaded: Loaded) -> Base:
-        """What is reused as long as no word changes: cases, and claims that they can answer."""
+        """What is reused as long as no word changes: cases, and claims on these laws."""
         cases = {n: loaded.case(s) for n, s in self.singles(loaded.scenario).items()}
         claims, unread = list[ParsedClaim](), tuple[str, ...]()
         try:
@@ -283,9 +297,13 @@ class Live:
         return Base(cases, claims, unread, "nominal" in loaded.root.mapping, several)
 
     def _moving(self, moved: Moved) -> tuple[Base, dict[str, Case]]:
-        """A case for each law, whose numbers are put into one that was loaded with the words."""
+        """The base of the moved words, and a case for each law, by label.
+
+        The moved numbers are put into the cases.
+        """
         words = {k: x for k, x in moved.items() if isinstance(x, str) or _is_loaded(route(k))}
         known = json.dumps(words)
+        # Only the last base is kept: words change seldom.
         if known not in self._bases:
             self._bases = {known: self._base_of(self.load(words))}
         base = self._bases[known]
@@ -294,7 +312,7 @@ class Live:
         }
 
     def _put(self, label: str, case: Case, moved: Moved, words: Moved, base: Base) -> Case:
-        """The case of a law with the moved numbers put in. Raises ScenarioError.
+        """The case of the law `label` with the moved numbers put in. Raises ScenarioError.
 
         `words` are moved values that are no numbers; `base` was loaded with them already.
         """
@@ -354,9 +372,10 @@ class Live:
         return self.load({}).scenario.labels()
 
     def save(self, moved: Moved, name: Any) -> dict[str, Any]:
-        """Write what differs into NAME.yaml in this folder. Raises StorageError where it is there.
+        """Write what differs into NAME.yaml in this folder; return file, text and a command for it.
 
-        It loads to the very scenario that is shown, or is written whole.
+        It is written only if it loads to the very scenario that is shown. Raises UsageError for a
+        bad name, StorageError where the file is there or would load to something else.
         """
         if not re.fullmatch(r"\w[\w-]*", str(name)):
             raise UsageError(f"{name!r} is no name; letters, digits, _ and -")
@@ -364,6 +383,7 @@ class Live:
         changed: dict[str, Any] = {}
         for key in [text.partition("=")[0] for text in self.assignments(moved)]:
             steps, inner, node = route(key), changed, loaded.root
+            # A list is written whole, as no file can change one item of another's.
             end = next((i for i, step in enumerate(steps) if isinstance(step, int)), len(steps))
             for step in steps[: end - 1]:
                 inner, node = inner.setdefault(str(step), {}), node.mapping[str(step)]
@@ -396,7 +416,7 @@ def _is_loaded(steps: Route) -> bool:
 
 
 def assignments_of(moved: Moved) -> list[str]:
-    """Values as `--set` takes them."""
+    """Moved values as `--set` takes them, KEY=VALUE; words stand without quotes."""
     return [
         f"{key}={value if isinstance(value, str) else json.dumps(value)}"
         for key, value in moved.items()
@@ -404,7 +424,10 @@ def assignments_of(moved: Moved) -> list[str]:
 
 
 def _table(scenario: Scenario, numbers: Mapping[str, Mapping[str, float]]) -> list[dict[str, Any]]:
-    """The headline metrics: name, words, unit, and a number or a word for each run."""
+    """The headline metrics: name, words, unit, and a number or a word for each run.
+
+    `numbers` are the metrics by label.
+    """
     first = [m.about for m in headlines_first(scenario.known_metrics()) if m.headline]
     return [
         {

@@ -33,7 +33,10 @@ SHOWN_MARGINS = (
 
 
 def claims_about(parsed: Sequence[ParsedClaim], labels: Sequence[str]) -> list[ParsedClaim]:
-    """The claims that name no other runs than these, which are a part of `scenario.labels()`."""
+    """The claims that name no other runs than `labels`.
+
+    These may be only some runs of the scenario.
+    """
     return [
         claim
         for claim in parsed
@@ -57,6 +60,7 @@ def past_run_of(
 ) -> PastRun:
     """A run that was only simulated, as claims ask it; `numbers` are its metrics by name."""
     known = {**numbers}
+    # Counting operations takes long, so only where a claim asks for them.
     if len(recording["time"]) and any(law_operations.name in c.claim.expect for c in parsed):
         known |= operations(case.plan, recording)
     return PastRun(label, case.about, recording, known, plugins=case.scenario.plugged)
@@ -69,10 +73,10 @@ def verdicts_on(
     *,
     at_rest: bool,
 ) -> list[dict[str, Any]]:
-    """The verdict on each claim, for the page.
+    """The verdict on each claim, for the page; `cases` are by label.
 
-    While values move, margins and the monitor's signals are missing: only the claims that can be
-    told without them are there.
+    While values move (not `at_rest`), margins and the monitor's signals are missing: then only
+    claims that can be told without them are among the verdicts.
     """
     if at_rest:
         scenarios = {label: case.scenario for label, case in cases.items()}

@@ -60,6 +60,7 @@ def look_at(log: Path, config: str, request: Request) -> LookedAt:
     page = request.out or Path(f"{log.stem}_look.html")
     if page.exists() and not request.force:
         raise StorageError(f"{page} exists; name another with --out, or replace it with --force")
+    # Read only now: a log may be long, and the page's place may be refused.
     contents = contents_of(log)
     found, extras = list_contents(contents, log.name, boat), Extras()
     from podusv_cli.figures.sketch import render_sketches

@@ -31,10 +31,11 @@ Config = Path | Callable[[Sequence[Check]], Loaded]
 def loaded_for(
     key: str, advice: str, config: Config, request: Request, faults: Sequence[Check]
 ) -> Loaded:
-    """The scenario with this key, of a file or of a folder that is to be continued.
+    """The scenario with the key `key`, of a file or of a folder that is to be continued.
 
-    Plug-in files of a folder are executed only where the request trusts them. Raises ScenarioError,
-    UsageError, with the advice where there is no such key, and StorageError for a damaged folder.
+    `faults` are checks beside the usual ones. Plug-in files of a folder are executed only where the
+    request trusts them. Raises ScenarioError, StorageError for a damaged folder, and UsageError,
+    with `advice`, where there is no such key.
     """
     if request.out and request.out.exists() and not request.out.is_dir():
         raise UsageError(f"--out {request.out} is a file; name a folder")
@@ -50,6 +51,7 @@ def loaded_for(
     if getattr(loaded.scenario, key) is None:
         named = config if isinstance(config, Path) else loaded.scenario.name
         raise UsageError(f"{named} has no key `{key}`, {advice}")
+    # Claims on single runs are only checked here: nobody judges them in a study.
     parse_claims(loaded)
     return loaded
 
@@ -66,7 +68,10 @@ def kept_scenario(
     added: Sequence[str] = (),
     plugged: Plugged = LOOKED_AT,
 ) -> Loaded:
-    """The scenario that a folder keeps; no link to another file, either."""
+    """The scenario that a folder keeps, with `overrides`; it names no file but its plug-ins.
+
+    `added` are plug-ins of the command line, and `plugged` takes in all of them.
+    """
     path = folder / SCENARIO
     return load_stored(files.read_text(path), str(path), overrides, checks, added, plugged)
 
@@ -89,7 +94,7 @@ def one_by_one(law: str, why: str) -> str:
 def executor_for(
     request: Request, folder: Path, scenario: Scenario, seal: str
 ) -> AbstractContextManager[Executor]:
-    """Where the units of a folder are made, whose study has this seal."""
+    """Where the units of a folder are made; `seal` digests the study's identity."""
     recipe = StudyText(files.read_text(folder / SCENARIO), tuple(scenario.plugin_files().items()))
     return executor(request.scheduler, request.workers, recipe, seal)
 
@@ -108,7 +113,7 @@ def interruption(kept: str, command: str, folder: Path) -> KeyboardInterrupt:
 def finish(
     folder: Path, extras: Extras, whole: str, command: str, status: Status = "finished"
 ) -> None:
-    """Write the manifest; KeyboardInterrupt in its place where figures or logs were interrupted.
+    """Write the manifest, or raise KeyboardInterrupt where figures or logs were interrupted.
 
     `whole` says what is there all the same, and `command` makes the rest.
     """

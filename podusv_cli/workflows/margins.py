@@ -1,4 +1,4 @@
-"""`podusv margins`: loop margins of a scenario's laws, told and kept in a folder."""
+"""`podusv margins`: loop margins of a scenario's laws, printed and kept in a folder."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _as_json(law: LoopMargins) -> dict[str, Any]:
 def margins(config: Path, request: Request, at: float | None = None) -> MarginsOfLaws:
     """The margins of all laws of a scenario, or of `request.controller`, written to `request.out`.
 
-    Nothing is written without a place. `at` [s] is when the steady motion begins. Raises
+    Nothing is written without `request.out`. `at` [s] is when the steady motion begins. Raises
     ScenarioError, StorageError, UsageError for a run folder, a time after the run, an unknown law
     or format. Where no law has margins it raises what is wrong with the first: LawError for a law
     that takes samples, NotConvergedError where there is no steady motion.

@@ -49,14 +49,13 @@ def track(
     plane: Plane | None = None,
     aligned: str = "",
 ) -> Track:
-    """The measured track of a log; the first of these sections says what its columns are called.
+    """The measured track of a log; the first of the sections `identify` names its columns.
 
-    `plane` is that of the runs beside it, in which latitudes and longitudes are placed.
-
-    A row stands where a position is new; all else is straight between its own values, and NaN
-    before the first and after the last of them. `top_speed` [m/s] is that of the fastest boat
-    beside it; `aligned` as in `Track`. Raises UsageError where the log has no positions, or has
-    mistakes that its motion shows.
+    `plane` is that of the runs beside it, in which latitudes and longitudes are placed. A row
+    stands where a position is new; all else is straight between its own values, and NaN before the
+    first and after the last of them. `top_speed` [m/s] is that of the fastest boat beside it;
+    `aligned` as in `Track`. Raises UsageError where the log has no positions, or has mistakes that
+    its motion shows.
     """
     from podusv_cli.identify.logs.checks import check_log
     from podusv_cli.identify.logs.reading import NamedQuantities, delivered_each, table
@@ -71,6 +70,7 @@ def track(
             f"`podusv identify --columns {path}` proposes lines for identify.columns of a scenario"
         )
     new = delivered_each(log.columns)
+    # A logger repeats a position until the next fix; only fixes count.
     rows = new["x"] & new["y"]
     if np.count_nonzero(rows) < 2:
         raise UsageError(f"{path}: has fewer than two positions, which is no track")
@@ -89,9 +89,9 @@ def track(
 
 
 def _at(at: Vector, times: Vector, values: Vector, *, turns: bool) -> Vector:
-    """A quantity at the times `at` (n,); NaN before its first value and after its last one.
+    """A quantity at the times `at` (n,) [s]; NaN before its first value and after its last one.
 
-    Its `values` (m,) are of `times` (m,) [s]; those of an angle go the shorter way round.
+    Its `values` (m,) are of `times` (m,) [s]; an angle (`turns`) goes the shorter way round.
     """
     known = np.isfinite(values)
     whole = np.unwrap(values[known]) if turns else values[known]
@@ -99,7 +99,7 @@ def _at(at: Vector, times: Vector, values: Vector, *, turns: bool) -> Vector:
 
 
 def _without_heading(times: Vector, psi: Vector | None) -> Iterator[str]:
-    """Of a log without heading, or whose heading begins later or ends earlier than positions."""
+    """A sentence on a log whose heading `psi` (n,) is missing or covers few of its positions."""
     if psi is None:
         yield NO_HEADING
         return

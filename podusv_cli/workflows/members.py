@@ -93,7 +93,7 @@ class Member:
 def from_folder(path: Path, files: Sequence[str] = ()) -> list[Member]:
     """The finished runs of a folder, as `runs_of` has them; `files` are plug-ins.
 
-    Raises UsageError for one of an older podusv of which the scenario cannot be read.
+    Raises UsageError for one of an older podusv whose scenario cannot be read.
     """
     plugins = on_hand(files)
     return [
@@ -139,7 +139,10 @@ def _find_unlisted(path: Path) -> list[Path]:
 
 
 def _find_listed(path: Path, optional: str) -> list[Path]:
-    """The runs of a finished comparison, or of one made again, in its order; none in a run."""
+    """The runs of a finished comparison, or of one made again, in its order; none in a run.
+
+    The manifest lists files by name; the comparison's table, or provenance, has the order.
+    """
     files = manifest.check(path, optional).files
     runs = sorted(name.removesuffix(f"/{LOG}") for name in files if name.endswith(f"/{LOG}"))
     head = _first_row(path / TABLE) if TABLE in files else _made_again(path, files)
@@ -161,7 +164,7 @@ def _first_row(path: Path) -> list[str]:
 
 
 def _check_member(path: Path, optional: str) -> RunFolder:
-    """The finished run in a folder, with its log sound. Raises StorageError."""
+    """The finished run in a folder, its log and theory.json checked. Raises StorageError."""
     run = open_run(path, optional=optional)
     if run.has_log and (wrong := _fault(run.recording)):
         raise StorageError(f"{path / LOG}: damaged, or not a log of a run: {wrong}")
@@ -170,7 +173,10 @@ def _check_member(path: Path, optional: str) -> RunFolder:
 
 
 def _told_before(run: RunFolder, files: Sequence[str]) -> RunAbout:
-    """What a run says about itself of which an older podusv wrote no about.json."""
+    """What a run says about itself of which an older podusv wrote no about.json.
+
+    It follows from the scenario; `files` are plug-ins. Raises UsageError where that cannot be read.
+    """
     source = str(run.path / RESOLVED)
     try:
         given = load_stored(run.resolved_yaml, source, plugged=partial(used_of, files))

@@ -29,12 +29,14 @@ def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
         raise UsageError(f"--out {out} is one of the studies, {inside[0]}; name another folder")
     started = datetime.now(UTC)
     others = [open_store(study) for study in studies]
+    # The largest study has room for the draws of all.
     most = max(others, key=lambda other: other.about.draws)
     store = Store(out, most.about)
     for other in others:
         store.agree(other)
     plugins = record.plugin_files(most.folder, most.about)
     texts = {SCENARIO: files.read_text(most.folder / SCENARIO), **plugins}
+    # Both the runs and the tables are written, which other commands lock singly.
     with sole_writer(out), sole_writer(out, TABLES):
         return _join_stores(store, others, texts, started, request)
 
@@ -46,7 +48,10 @@ def _join_stores(
     started: datetime,
     request: Request,
 ) -> Swept:
-    """Write the runs of the others into a study, and judge it where it is whole."""
+    """Write the runs of the others into `store`, and judge the study where it is whole.
+
+    `texts` are its scenario and plug-ins by file.
+    """
     out = store.folder
     store.open(started.isoformat(timespec="seconds"), texts)
     session = SessionLog(out, request.argv, started, (), [other.folder for other in others])

@@ -109,7 +109,7 @@ class WrittenFiles:
 
 
 def new(what: str, name: str) -> WrittenFiles:
-    """Write the starting files of a part into the current folder.
+    """Write the starting files of a part (`what`, one of PARTS) into the current folder.
 
     Raises UsageError for a name that cannot be one, StorageError where a file exists.
     """
@@ -137,7 +137,10 @@ def _check_name(what: str, name: str) -> None:
 
 
 def _words(what: str, name: str) -> dict[str, str]:
-    """What stands for each placeholder in the template of a part."""
+    """What stands for each placeholder in the template of a part.
+
+    `what` is the kind of the part, as `law`, and `name` its own name.
+    """
     own = {word: text.replace("$name", name) for word, text in PARTS[what].words.items()}
     return (
         DEFAULTS

@@ -85,10 +85,11 @@ def optimum(
     step: float,
     progress: Progress | None = None,
 ) -> Optimum:
-    """Find the optimum of a scenario from a run of its law, and write a run that repeats it.
+    """Find the optimum of a scenario from runs of its laws, and write a run that repeats it.
 
-    `step` [s] is that of the finest grid. Raises UsageError without CasADi and for a scenario that
-    it cannot take, ScenarioError, LawError, NotConvergedError, StorageError.
+    `minimised` is what is least, `step` [s] that of the finest grid. Raises UsageError without
+    CasADi and for a scenario that it cannot take, ScenarioError, LawError, NotConvergedError,
+    StorageError.
     """
     collocation.casadi()
     checks = (unknown_codes, limits(request.allow_large))
@@ -103,15 +104,19 @@ def optimum_of(
     step: float,
     progress: Progress | None = None,
 ) -> Optimum:
-    """The same for a scenario that is loaded already."""
+    """Find and write the optimum as `optimum` does, for a scenario that is loaded already.
+
+    `step` [s] is that of the finest grid.
+    """
     collocation.casadi()
     scenario = single(loaded, request.controller) if request.controller else loaded.scenario
     wanted = problem(scenario, minimised)
+    # Names of figures and the place are checked before minutes of computing.
     check_figures(scenario)
     target = request.out or free_folder(RESULTS / scenario.name / "optimum")
     size = estimate(scenario, loaded.plan(scenario))
     with RunWriter(target, force=request.force, needed=size.bytes_needed):
-        pass  # a place that cannot be written to is told before anything is computed
+        pass  # fails before anything is computed where the place cannot be written to
     guesses = _guesses(scenario)
     stages, motion = collocation.search_optima(wanted, guesses, step, progress)
     repeated = _repeating(scenario, wanted, motion)
@@ -131,9 +136,10 @@ def optimum_of(
 
 
 def _guesses(scenario: Scenario) -> dict[str, Motion]:
-    """Runs of the scenario's laws, and of velocity_vector, from which the search may begin.
+    """Runs from which the search may begin: of the scenario's laws, and of velocity_vector.
 
-    A law that diverges is left out. Raises LawError, and UsageError where all diverge.
+    They are listed by label. A law that diverges is left out. Raises LawError, and UsageError where
+    all diverge.
     """
     singles = scenario.singles()
     if not any(single.controller.label == BESIDE.label for single in singles.values()):
@@ -155,7 +161,7 @@ def _run(scenario: Scenario) -> Recording:
 
 
 def _repeating(scenario: Scenario, wanted: OptimumProblem, motion: Motion) -> Scenario:
-    """The scenario with the optimum in place of its law, which acts continuously."""
+    """The scenario with the optimum's demands in place of its law, which acts continuously."""
     law = Schedule(rows=schedule(wanted, motion), minimises=wanted.minimised)
     description = f"A motion of least {wanted.minimised}, found by podusv optimum."
     changes = {"controller": law, "control": Control(), "description": description}
@@ -163,13 +169,17 @@ def _repeating(scenario: Scenario, wanted: OptimumProblem, motion: Motion) -> Sc
 
 
 def _departures(folder: Path, motion: Motion) -> dict[str, float]:
-    """How far the run of a folder is from the motion that it repeats, at most."""
+    """The largest differences between the run in `folder` and the motion that it repeats, by name.
+
+    Position [m], and what feedback added in surge [N], yaw [N m] and sway [N]; {} without a log.
+    """
     log = open_run(folder).recording
     if not len(log["time"]):
         return {}
     away = [np.interp(motion.times, log["time"], log[name]) for name in ("x", "y")]
     position = np.hypot(away[0] - motion.states[:, 0], away[1] - motion.states[:, 1])
     added = {name: float(abs(log[name]).max()) for name in ("feedback_u", "feedback_r")}
+    # A column only where the actuator takes a sway force.
     for sway in motion.demands[:, 2:].T:
         asked = np.interp(motion.times, log["time"], log[SWAY_DEMAND.name])
         added["feedback_v"] = float(abs(asked - sway).max())

@@ -83,8 +83,9 @@ class PackedContents:
         return {"format": 1, **asdict(self)}
 
     def repeat(self, folder: Path) -> str:
-        """The command that makes it once more; "" where there is none."""
+        """The command that makes the result once more from `folder`; "" where there is none."""
         command = AGAIN.get(self.kind, "")
+        # Without its log the original cannot be compared, so the new run is kept.
         kept = " --out again" if self.lacking and "rerun" in command else ""
         own = [name for name in self.code if not _is_wheel(name)]
         trust = " --trust" if command and own else ""
@@ -115,6 +116,7 @@ def pack(folder: Path, out: Path, *, logs: bool, force: bool) -> WrittenArchive:
     sessions = _sessions(
         json_files.read_as(folder / name, _PackOrigin) for name in sizes if _is_origin(name)
     )
+    # Wheels from an earlier unpacking are packed again.
     foreign = manifest.foreign(folder, listed)
     sizes |= {name: (folder / name).stat().st_size for name in foreign if _is_wheel(name)}
     made = {name: data for name, data in _wheels(sessions).items() if name not in sizes}
@@ -222,7 +224,10 @@ def _packages(sessions: Iterable[_PackSession]) -> list[tuple[str, str, str]]:
 
 
 def _find_package(package: str, version: str, sha256: str, sizes: Mapping[str, int]) -> str:
-    """Whether this very package is installed, and where its wheel is else."""
+    """Whether the very package (by digest) is installed here; else what to do for it.
+
+    `sizes` are the packed files, where its wheel may be.
+    """
     here = {plugin.name: plugin for plugin in installed_plugins()}.get(package)
     if here and here.sha256 == sha256:
         return "installed"
@@ -233,7 +238,11 @@ def _find_package(package: str, version: str, sha256: str, sizes: Mapping[str, i
 
 
 def _wheels(sessions: Iterable[_PackSession]) -> dict[str, bytes]:
-    """Wheels of these packages, where the very ones are installed and have no compiled modules."""
+    """Wheels, by file name, of packages that these sessions used.
+
+    Only where the very ones are installed and have no compiled modules, so that any machine takes
+    them.
+    """
     here = {(plugin.name, plugin.sha256): plugin for plugin in installed_plugins()}
     used = {
         (name, version): here.get((name, sha256)) for name, version, sha256 in _packages(sessions)

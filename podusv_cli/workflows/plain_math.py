@@ -58,6 +58,7 @@ def plain(latex: str) -> str:
     """An equation in plain symbols, a line for each row, its columns below each other."""
     body = re.sub(r"\\(begin|end)\{(aligned|gathered)\}", "", latex).strip()
     rows = _LatexReader(SIZES.sub("", body)).read_rows()
+    # The last cell of a row has no width: nothing stands behind it.
     widths = [max(map(len, column)) for column in zip(*_pad_rows(rows), strict=True)]
     return "\n".join(_format_row(row, widths) for row in rows)
 
@@ -69,7 +70,7 @@ def _pad_rows(rows: list[list[str]]) -> Iterator[list[str]]:
 
 
 def _format_row(cells: list[str], widths: list[int]) -> str:
-    """A left and a right side at a time, as `aligned` pairs its columns.
+    """A row of cells as text, a left and a right side at a time, as `aligned` pairs its columns.
 
     A right side alone, such as the number of the equation, follows at once: lines stay short.
     """
@@ -125,7 +126,7 @@ class _LatexReader:
         return _join(symbols)
 
     def _read_symbol(self) -> _MathSymbol:
-        """The next symbol, group or command."""
+        """The next symbol, group or command; the token is taken."""
         token = self._take()
         if token == "{":
             return _MathSymbol(self._read_rest_of_group())
@@ -154,7 +155,7 @@ class _LatexReader:
         return _MathSymbol(NAMES.get(name, name if name.isalpha() else name.strip(",;!") or " "))
 
     def _read_fraction(self) -> _MathSymbol:
-        """A fraction on one line; brackets only where they are needed."""
+        """A fraction on one line; brackets only where it would read otherwise without them."""
         over, under = self._read_group(), self._read_group()
         over = f"({over})" if re.search(r" [-+x] |, ", _without_brackets(over)) else over
         under = f"({under})" if re.search(r"[\s/+-]", _without_brackets(under)) else under
@@ -183,7 +184,7 @@ class _LatexReader:
         return inside
 
     def _read_words(self) -> str:
-        """What the next braces hold, as it is written."""
+        """What the next braces hold, as it is written; the braces are taken."""
         self._take()
         words = ""
         while self._peek() not in ("}", ""):
@@ -200,19 +201,21 @@ class _LatexReader:
 
 
 def _join(symbols: list[_MathSymbol]) -> str:
-    """Symbols in a row, a space between names; LaTeX needs none there."""
+    """Symbols in a row, with a space between names, which LaTeX does not need."""
     text = ""
     for symbol in map(str, symbols):
         apart = re.search(r"[\w'*]$", text) and re.match(r"\w", symbol)
         text += f" {symbol}" if apart else symbol
+    # Wide gaps stand as tabs until here, and products (a dot without spaces) as \v.
     spaced = re.sub(r"\s*\t\s*", GAP, re.sub(r"[ \n]+", " ", text))
     return re.sub(r" (?=[,;.])", "", re.sub(r"\s*\v\s*", ".", spaced)).strip()
 
 
 def _format_index(index: str) -> str:
-    """What stands below a symbol: m11 and X_udot, as keys and logs are called."""
+    """What stands below a symbol, as keys and logs are called: m11, X_udot."""
     if len(index) > 1 and index.isdigit():
         return index
+    # A dot above an index, as in X_{\dot u}, has become a prime by now.
     named = re.sub(r"(?<=\w) (?=\w)", "", index.replace("'", "dot"))
     named = re.sub(r",(?=\S)", "_", named)
     return f"_{named}" if re.fullmatch(r"\w+", named) else f"_({index})"

@@ -63,7 +63,10 @@ class PlotChoice:
 
 
 def look_of(columns: int, size: str, style: str) -> Look:
-    """The look that is asked for; `size` is WIDTH or WIDTHxHEIGHT in inches. UsageError."""
+    """The look that is asked for: width in columns of a page, or `size`, and the name of a style.
+
+    `size` is WIDTH or WIDTHxHEIGHT in inches, "" for that of the columns. Raises UsageError.
+    """
     if style not in STYLES:
         raise UsageError(unknown_word(f"style {style!r}", style, STYLES))
     if not size:
@@ -116,7 +119,7 @@ def plot(runs: Sequence[Path], request: Request, choice: PlotChoice = PlotChoice
 
 
 def _name_members(members: Sequence[Member], labels: Sequence[str]) -> list[Member]:
-    """The runs under the names that are given for them, if any."""
+    """The runs under the names in `labels`, if any. Raises UsageError unless each run has one."""
     if not labels:
         return list(members)
     if len(labels) != len(members) or len({*labels}) < len(labels):
@@ -128,8 +131,13 @@ def _name_members(members: Sequence[Member], labels: Sequence[str]) -> list[Memb
 
 
 def _during(log: Recording, choice: PlotChoice) -> Recording:
-    """The part of a log that is asked for; one that ends before the run does is whole."""
+    """The part of a log that is asked for.
+
+    A part that ends before the run does counts as finished, so that no figure marks its end as a
+    failure.
+    """
     t = log["time"]
+    # The last instant is included.
     first, last = np.searchsorted(t, [choice.since, np.nextafter(choice.until, math.inf)])
     if (first, last) == (0, len(t)):
         return log
@@ -140,8 +148,8 @@ def _during(log: Recording, choice: PlotChoice) -> Recording:
 def _label_members(members: Iterable[Member]) -> list[Member]:
     """Each run folder once, with a label that tells it apart from the others.
 
-    The folder's name, or the scenario's where the folder has none of its own; where several have
-    the same, with their scenario's name, else with the folder around them, else with all of it.
+    The folder's name, or the scenario's where the folder is named by a time; where several have the
+    same, with their scenario's name, else with the folder around them, else with all of it.
     """
     kept = list({_folder(member).resolve(): member for member in members}.values())
     labels = [_short(member) for member in kept]
@@ -165,7 +173,10 @@ def _short(member: Member) -> str:
 
 
 def _empty(runs: Sequence[PastRun], shown: Sequence[Shown]) -> dict[str, str]:
-    """Runs of which nothing can be drawn, and how they ended; UsageError where those are all."""
+    """Runs of which nothing can be drawn, and how they ended; `shown` are those to draw.
+
+    Raises UsageError if none is left.
+    """
     drawable = {run.label for run in shown}
     endings = {
         run.label: run.recording.message or "has a single row"
@@ -188,9 +199,9 @@ LONGER_NAMES: tuple[Callable[[Member], str], ...] = (
 def _choose_sheets(
     asked: Sequence[str], known: Mapping[str, Sheet], shown: Sequence[Shown], signals: Sequence[str]
 ) -> list[Sheet]:
-    """The figures to draw: those that are asked for, or all that the runs have signals for.
+    """The figures to draw: those `asked` for and one of `signals`, or all that the runs can fill.
 
-    Raises UsageError for one that they have no signals for.
+    `known` are all figures by name. Raises UsageError for one that the runs have no signals for.
     """
     fitting = {name: sheet for name, sheet in known.items() if sheet.fits(shown)}
     asked = [*fitting] if ALL in asked else asked
@@ -212,7 +223,10 @@ def _choose_sheets(
 
 
 def _check_not_finished(out: Path, names: Iterable[str]) -> None:
-    """UsageError where a file to be written belongs to a finished folder, by its manifest."""
+    """Raise UsageError where a file to be written belongs to a finished folder, by its manifest.
+
+    The folder may be `out` or one around it.
+    """
     place = Path(os.path.realpath(out))
     for folder in (place, *place.parents):
         listed = _list_folder(folder)
@@ -233,7 +247,10 @@ def _list_folder(folder: Path) -> frozenset[str]:
 
 
 def _put(out: Path, contents: Mapping[str, bytes]) -> list[Path]:
-    """Write files into a folder; those that were there with another content. StorageError."""
+    """Write files into a folder; the paths of those that were there with another content.
+
+    Raises StorageError.
+    """
     files.make_folder(out)
     places = {out / name: content for name, content in contents.items()}
     replaced = [path for path, content in places.items() if _differs(path, content)]

@@ -116,7 +116,8 @@ def _scenario(run: RunFolder, request: Request) -> Scenario:
 
 
 def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
-    """Simulate one run again and compare it with what there was."""
+    """Simulate one run again and compare it with the original."""
+    # There is exactly one.
     ((original, scenario),) = runs
     label = original.path.name or str(original.path)
     advance = partial(progress, label) if progress else None
@@ -129,7 +130,10 @@ def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition
 
 
 def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
-    """Simulate the runs of a comparison again and compare each with what there was."""
+    """Simulate the runs of a comparison again and compare each with the original.
+
+    One that cannot be made is among the failures.
+    """
     again = [
         Member(
             run.path.name,
@@ -166,7 +170,7 @@ def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repeti
 
 @contextmanager
 def _passing(request: Request) -> Iterator[Path]:
-    """A folder that is gone afterwards, for runs that are not to be kept."""
+    """The folder to write runs into: that of `request.out`, else one that is removed afterwards."""
     if request.out is not None:
         yield request.out.parent
         return

@@ -52,7 +52,7 @@ def run_loaded(
     progress: Progress | None = None,
     watch: Stopwatch | None = None,
 ) -> Finished:
-    """Execute a scenario that is loaded and checked. Raises StorageError."""
+    """Execute a scenario that is loaded and checked. Raises UsageError, LawError, StorageError."""
     watch = watch or Stopwatch()
     with watch.part("load"):
         scenario = single(loaded, request.controller)
@@ -84,7 +84,10 @@ def run_loaded(
 
 
 def _choices(scenario: Scenario, others: Sequence[str]) -> Iterator[str]:
-    """What nobody chose: the law of several, and the numbers that follow from hull and actuator."""
+    """Sentences on what nobody chose: the law of several, and the numbers by rule.
+
+    `others` are the laws that do not run.
+    """
     if others:
         only = f"runs `controller` ({scenario.controller.label}) only"
         yield f"{only}; `podusv compare` runs {', '.join(others)}"
@@ -94,7 +97,7 @@ def _choices(scenario: Scenario, others: Sequence[str]) -> Iterator[str]:
 
 
 def check_asked(request: Request, plugins: Iterable[Plugins]) -> None:
-    """UsageError for a figure or format that there is not, and for figures that are not wanted."""
+    """Raise UsageError for unknown figures and formats, and for figures that are unwanted."""
     if request.names and not request.figures:
         raise UsageError(f"--figure {request.names[0]} and --no-figures contradict each other")
     if request.names or set(request.formats) != {"png"}:
@@ -107,7 +110,10 @@ def check_asked(request: Request, plugins: Iterable[Plugins]) -> None:
 
 
 def others(loaded: Loaded, label: str = "") -> tuple[str, ...]:
-    """The `controllers` of a scenario of which `single` takes its `controller`, unchosen."""
+    """The `controllers` that do not run where nobody chose a law by `label`.
+
+    Empty if there is no choice.
+    """
     several = loaded.scenario.controllers  # one may be the `controller` under a name
     alone = label or list(several.values()) == [loaded.scenario.controller]
     return () if alone else tuple(several)

@@ -61,7 +61,7 @@ KINDS = {
 
 @dataclass(frozen=True)
 class ListedRun:
-    """A run, study, search or bench as its files tell of it."""
+    """A run, study, search or bench as its files describe it."""
 
     folder: Path
     kind: str
@@ -88,7 +88,7 @@ class ListedRun:
 
 
 def runs(root: Path, where: Sequence[str] = (), sort: str = "") -> list[ListedRun]:
-    """What is below a folder: the latest first, or by a metric, the smallest first.
+    """What is below a folder: the latest first, or by a metric (`sort`), the smallest first.
 
     `where` are `key=value` of scenarios, all of which have to hold. Raises UsageError for a folder
     that is none, and for a key or metric that nothing here has.
@@ -116,7 +116,9 @@ def _below(root: Path) -> Iterator[ListedRun]:
     for place, inside, names in os.walk(root):
         inside[:] = sorted(name for name in inside if not name.startswith("."))
         mark = next((name for name in KINDS if name in names), None)
+        # A results' folder has a manifest once finished; studies and searches are listed before.
         if mark and ({MANIFEST, STUDY, "tune.json"} & {*names}):
+            # Runs inside a result belong to it.
             inside.clear()
             yield _read(Path(place), mark)
 
@@ -133,6 +135,7 @@ def _read(folder: Path, mark: str) -> ListedRun:
         text = files.read_text(folder / scenario) if scenario else ""
     except StorageError:
         return ListedRun(folder, kind, status=DAMAGED)
+    # A study notes its sessions (sittings), a run has its times at the top.
     sessions = [*origin.sittings, origin]
     named = NAME.search(text)
     metrics = about.metrics if isinstance(about, _OfRun) else {}
@@ -154,7 +157,10 @@ def _if_there(path: Path, model: type[json_files.Model]) -> json_files.Model:
 
 
 def _holding(every: Sequence[ListedRun], condition: str) -> list[ListedRun]:
-    """Those whose scenario has this value. Raises UsageError where none has the key."""
+    """Those whose scenario has the value of `condition`, as `controller.kind=pid`.
+
+    Raises UsageError where none has the key.
+    """
     key, equals, text = condition.partition("=")
     wanted = read(text, condition, [], placed=False) if equals and text else None
     if wanted is None:

@@ -118,7 +118,7 @@ def start(boat: Boat, out: Path, route: str = "") -> Path:
 
 
 def start_from(preset: str, out: Path, route: str = "") -> Path:
-    """The same for a vessel of podusv whose thrusters are known, too."""
+    """As `start`, for a vessel of podusv whose thrusters are known, too."""
     known = [name for name in preset_names(VESSELS) if name in preset_names(Pods.presets)]
     if preset not in known:
         raise UsageError(unknown_word(f"boat {preset!r}", preset, known))
@@ -127,7 +127,11 @@ def start_from(preset: str, out: Path, route: str = "") -> Path:
 
 
 def _write_new(out: Path, text: str, way: StartingLegs | None) -> Path:
-    """Write a scenario that loads, and its schema. Raises StorageError where `out` exists."""
+    """Write a scenario that loads (`text`) and its schema; returns the scenario's file.
+
+    `way` has the legs of a user's route. Raises StorageError where `out` exists, and UsageError
+    where the scenario does not load.
+    """
     if out.exists():
         raise StorageError(f"{out} exists; name another file with --out")
     _check(text, out, way)
@@ -139,7 +143,10 @@ def _write_new(out: Path, text: str, way: StartingLegs | None) -> Path:
 
 
 def _check(text: str, out: Path, way: StartingLegs | None) -> None:
-    """Raise UsageError for a scenario that `podusv validate` would refuse."""
+    """Raise UsageError for a scenario that `podusv validate` would refuse.
+
+    With a user's route (`way`), the message has its length as a hint.
+    """
     try:
         load_text(text, str(out), checks=(unknown_codes, limits(insist=""), sweep_faults))
     except ScenarioError as error:
@@ -191,7 +198,11 @@ def _hull(boat: Boat, out: Path) -> tuple[Hull, Thrusters]:
 
 
 def _wider(hull: Hull) -> str:
-    """How wide hulls have to be that lie no deeper than that: the depth times the width stays."""
+    """The end of a message: how wide hulls must be that lie no deeper than they are wide.
+
+    Depth times width stays the same for the same mass.
+    """
+    # Rounded up to a centimetre.
     least = math.ceil(100.0 * math.sqrt(hull.draught * hull.narrow)) / 100.0
     return (
         f", or give --hull-beam {least:g} or more: without it, each hull is a tenth of the length "
@@ -200,7 +211,11 @@ def _wider(hull: Hull) -> str:
 
 
 def _number(name: str, text: str, unit: str, *, zero: bool = False) -> float:
-    """A number above 0 (or 0) as in a scenario, with or without a unit. Raises UsageError."""
+    """A number above 0 (or 0, if `zero`) as in a scenario, with or without a unit; in `unit`.
+
+    `name` is the option in messages, `text` what was given. Raises UsageError, also for a number
+    that no boat has.
+    """
     option, plain = f"--{name.replace('_', '-')} {text}", resolve(text.strip())
     number = units.number(plain, unit) if isinstance(plain, str) else plain
     if number is None or isinstance(number, bool):
@@ -218,7 +233,10 @@ def _number(name: str, text: str, unit: str, *, zero: bool = False) -> float:
 
 
 def _thrusters(boat: Boat, out: Path) -> Thrusters:
-    """Thrusters from words as `EXAMPLE` has them. Raises UsageError."""
+    """The thrusters from words as `EXAMPLE` has them, and the angle that they turn by.
+
+    `out` is the scenario's file, from which a table is named. Raises UsageError.
+    """
     match = THRUSTERS.fullmatch(boat.thrusters.strip())
     if not match:
         raise UsageError(f"--thrusters {boat.thrusters}: write them as {EXAMPLE}; or {BY_TABLE}")
@@ -231,6 +249,7 @@ def _thrusters(boat: Boat, out: Path) -> Thrusters:
             f"--thrusters {boat.thrusters}: one at @0, two or four with a lever above 0; {EXAMPLE}"
         )
     if turn > TURN:
+        # A number such as 35 without a unit would be 35 rad.
         degrees = turn <= 90.0 and not units.split_quantity(boat.turn)
         way = f"; write {boat.turn}deg" if degrees else ""
         raise UsageError(f"--turn {boat.turn}: more than 90 deg to either side{way}")
@@ -254,6 +273,7 @@ def _thrust(words: str, given: str, out: Path) -> tuple[float, str]:
     storage.make_folder(out.parent)  # the table is read from there
     name = os.path.relpath(words, out.parent)
     file = as_yaml(name) if name.isprintable() else repr(name)
+    # A scenario of two such pods is loaded to read the table as any scenario would.
     alike = [
         f"{{x: -1, y: {y}, table: {file}, n_rate: 4, n_lag: 0.3, angle_limit: 0}}" for y in (-1, 1)
     ]
@@ -270,7 +290,10 @@ def _thrust(words: str, given: str, out: Path) -> tuple[float, str]:
 
 
 def _way(route: str, out: Path) -> StartingLegs | None:
-    """The legs of a route beside the scenario `out`; None without one. Raises UsageError."""
+    """The legs of the file `route` as the scenario `out` names it; None without one.
+
+    Raises UsageError for a file that is no route.
+    """
     if not route:
         return None
     if not os.path.isfile(route):
@@ -278,6 +301,7 @@ def _way(route: str, out: Path) -> StartingLegs | None:
     storage.make_folder(out.parent)  # the route is read from there
     file = relative_path(route, out.parent)
     path = as_yaml(file) if file.isprintable() else repr(file)
+    # A small scenario is loaded to read the route as any scenario would.
     text = f"name: boat\nvessel: {{preset: otter}}\nactuator: {{kind: ideal}}\n{BESIDE}".replace(
         "kind: line", f"kind: legs, file: {path}"
     )
@@ -291,6 +315,7 @@ def _way(route: str, out: Path) -> StartingLegs | None:
         lines.append(
             f"origin: {{lat: {scenario.origin.lat:.12g}, lon: {scenario.origin.lon:.12g}}}"
         )
+    # The boat starts at the first waypoint, its bow to the second.
     (x, y), (ahead, right) = points[0], np.subtract(points[1], points[0])
     psi = math.degrees(math.atan2(right, ahead))
     lines.append(f"start: {{x: {x:.10g}, y: {y:.10g}, psi: {psi:.4g} deg}}")
@@ -301,7 +326,11 @@ def _way(route: str, out: Path) -> StartingLegs | None:
 def _of_dimensions(
     hull: Hull, thrusters: Thrusters, way: StartingLegs | None, out: Path, *, known: bool
 ) -> str:
-    """The scenario's text for a boat of these dimensions; `known` says if its speed was given."""
+    """The scenario's text for a boat of these dimensions; `known` says if its speed was given.
+
+    `way` has the legs of a user's route, if any, and `out` names the scenario in messages.
+    """
+    # Estimates have no more than three good digits.
     numbers = {name: float(f"{x:.3g}") for name, x in estimate_vessel(hull).items()}
     boat = "\n".join([*_vessel(hull, numbers, known), "", *_actuator(hull, thrusters)])
     title = f"A boat of {hull.length:g} m; inertia and damping are estimates from its dimensions."
@@ -309,7 +338,10 @@ def _of_dimensions(
 
 
 def _of_preset(preset: str, way: StartingLegs | None, out: Path) -> str:
-    """The scenario's text for a vessel of podusv with its thrusters."""
+    """The scenario's text for a vessel of podusv with its thrusters.
+
+    `way` has the legs of a route, if one is given; `out` names the scenario in messages.
+    """
     boat = (
         f"vessel: {{preset: {preset}}} # its source and validity: podusv explain {preset}\n"
         f"actuator: {{kind: pod, preset: {preset}}}"
@@ -326,6 +358,7 @@ def _fill_template(title: str, boat: str, study: str, way: StartingLegs | None, 
     vessel, facts = scenario.vessel, scenario.facts
     hull = Hull(vessel.length, vessel.beam, vessel.m, facts.F, speed=facts.U)
     holds = vessel.envelope.speed if vessel.envelope else math.inf
+    # The least of the usual speed, that of the hull's validity, and one that turns within RADIUS.
     speed = float(f"{min(hull.cruise, holds, RADIUS * facts.r_top * hull.length):.2g}")
     way = way or _way_of(hull)
     words = {
@@ -337,6 +370,7 @@ def _fill_template(title: str, boat: str, study: str, way: StartingLegs | None, 
         "speed": f"{speed:g}",
         "about_way": way.about,
         "way": "\n".join(way.lines),
+        # In whole tens of seconds; TIME is the allowance over the time at this speed.
         "duration": f"{10.0 * math.ceil(0.1 * TIME * way.length / speed):g}",
         "study": study,
     }
@@ -345,7 +379,7 @@ def _fill_template(title: str, boat: str, study: str, way: StartingLegs | None, 
 
 
 def _way_of(hull: Hull) -> StartingLegs:
-    """Legs for a boat without a route: a few lengths north, east, and south again."""
+    """Legs for a boat without a route: north, east and south again, a few lengths [m] each."""
     long, wide = (float(f"{part * hull.length:.2g}") for part in LEGS)
     points = ((0.0, 0.0), (long, 0.0), (long, wide), (0.0, wide))
     written = ", ".join(f"[{x:g}, {y:g}]" for x, y in points)
@@ -375,7 +409,11 @@ FAST = {  # where that time constant alone would ask for more than full thrust a
 
 
 def _vessel(hull: Hull, numbers: dict[str, float], known: bool) -> Iterator[str]:
-    """The lines of `vessel`; `numbers` are the estimated derivatives by name, in SI units."""
+    """The lines of the YAML section `vessel`.
+
+    `numbers` are the estimated derivatives by name, in SI units; `known` says if the speed was
+    given.
+    """
     top = f"{hull.top_speed:.3g} m/s at full thrust{'' if known else ' (a guess, Fn 0.4)'}"
     yield "vessel: # `estimated` is no measurement; podusv docs start has the errors to expect"
     yield "  source: estimated from length, beam and mass by podusv start; no number was measured"
@@ -386,12 +424,13 @@ def _vessel(hull: Hull, numbers: dict[str, float], known: bool) -> Iterator[str]
     for name, why in (WHY if numbers["X_uu"] else WHY | FAST).items():
         unit = unit_of(Vessel.model_fields[name])
         yield f"  {name}: {numbers[name]:g} # {unit}, estimated: {why}"
+    # Areas from ahead and from the side [m2].
     front, side = (HEIGHT * hull.length * along for along in (hull.beam, hull.length))
     yield f"  windage: {{A_F: {front:.2g}, A_L: {side:.2g}}} # m2, a guess: 0.1 L high"
 
 
 def _actuator(hull: Hull, thrusters: Thrusters) -> Iterator[str]:
-    """The lines of `actuator`: a pod for each thruster."""
+    """The lines of the YAML section `actuator`: a pod for each thruster."""
     turning = "fixed" if not thrusters.turn else "turning"
     law = "thrust by a table" if thrusters.table else "so T_nn is the largest thrust [N]"
     yield f"actuator: # {turning} thrusters; n from -1 to 1, {law}"
@@ -405,6 +444,7 @@ def _actuator(hull: Hull, thrusters: Thrusters) -> Iterator[str]:
         angle += ", angle_rate: 1.0, angle_lag: 0.2"
     for lever in thrusters.levers:
         place = f"x: {-AFT * hull.length:.3g}, y: {lever:g}"
+        # n is the part of full speed, -1 to 1. Thrust astern as ahead is a guess.
         force = f"T_nn: {thrusters.thrust:g}, T_nn_astern: {thrusters.thrust:g}"
         force += ", n_max: 1, n_max_astern: 1"
         force = f"table: {thrusters.table}" if thrusters.table else force
@@ -412,7 +452,10 @@ def _actuator(hull: Hull, thrusters: Thrusters) -> Iterator[str]:
 
 
 def _study(numbers: dict[str, float]) -> Iterator[str]:
-    """What a study and `doubt` vary: factors with the scatter that the estimates have."""
+    """Lines on what a study and `doubt` vary: factors with the scatter that the estimates have.
+
+    `numbers` are the estimates, by key of the vessel.
+    """
     yield ""
     yield "sweep: # hulls that such dimensions leave possible; no law is told: podusv sweep run"
     yield "  draws: 100"
@@ -426,6 +469,7 @@ def _study(numbers: dict[str, float]) -> Iterator[str]:
     yield "  printed: [vessel.m] # it was weighed"
     yield "  vary:"
     for name, scatter in SCATTER.items():
+        # A derivative that is 0 cannot be moved by a factor.
         for key in filter(numbers.get, FACTORS[name]):
             low, high = math.exp(-scatter), math.exp(scatter)
             yield f"    vessel.{key}: {{times: {{log_uniform: [{low:.2g}, {high:.2g}]}}}}"

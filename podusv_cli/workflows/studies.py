@@ -60,10 +60,9 @@ def check_study(folder: Path) -> None:
 def open_store(study: Path) -> Store:
     """The store of a study's folder, for reading; its scenario and plug-ins are not looked at.
 
-    Only where an older podusv wrote study.json, its scenario is, with installed plug-ins alone.
-
-    Raises UsageError where the folder is no study, and where the scenario needs another plug-in;
-    StorageError where it is damaged.
+    Where an older podusv wrote study.json, its scenario is looked at, with installed plug-ins
+    alone. Raises UsageError where the folder is no study, and where the scenario needs another
+    plug-in; StorageError where it is damaged.
     """
     check_study(study)
     return Store(study, before.about(study, partial(_of_before, study)))
@@ -113,9 +112,10 @@ def status(study: Path) -> Made:
 def draw(
     study: Path, law: str, number: int, cell: int, out: Path | None, *, trusted: bool = False
 ) -> Path:
-    """Write the scenario of one run of a study, whose plug-ins are executed if they are `trusted`.
+    """Write the scenario of one run of a study to `out`, or beside: law, draw `number` and `cell`.
 
-    Raises UsageError, ScenarioError where they are not, StorageError.
+    Its plug-ins are executed if they are `trusted`. Raises UsageError, ScenarioError where they are
+    not, StorageError.
     """
     made = read_plan(study, trusted=trusted)
     if law not in made.laws:
@@ -138,7 +138,10 @@ def draw(
 
 
 def export(study: Path, form: str, out: Path | None) -> Path:
-    """Write all runs as one table. Raises UsageError, StorageError."""
+    """Write all runs as one table: `form` is csv or parquet, `out` the file (None: in the study).
+
+    Raises UsageError, also for a study without results, and StorageError.
+    """
     if form not in FORMATS:
         raise UsageError(unknown_word(f"format {form!r}", form, FORMATS))
     path = out or study / f"runs.{form}"

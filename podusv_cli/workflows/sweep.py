@@ -87,9 +87,9 @@ class Swept:
 def run(config: Config, request: Request, tell: Tell) -> Swept:
     """Simulate what is missing of a study, and judge it once all of it is there.
 
-    `config` is a scenario or the folder of a study. Raises ScenarioError, UsageError where the
-    folder holds another study, StorageError, and KeyboardInterrupt; every unit that was finished is
-    kept.
+    `config` is a scenario or the folder of a study; `tell` is called with the tally after each
+    unit. Raises ScenarioError, UsageError where the folder holds another study, StorageError, and
+    KeyboardInterrupt; every unit that was finished is kept.
     """
     started = datetime.now(UTC)
     made, folder, texts = _plan_study(config, request)
@@ -106,10 +106,14 @@ def run(config: Config, request: Request, tell: Tell) -> Swept:
 
 
 def _run(store: Store, made: StudyPlan, request: Request, started: datetime, tell: Tell) -> Swept:
-    """Simulate what is missing of a study whose folder is open, and judge it if it is whole."""
+    """Simulate what is missing of a study whose folder is open, and judge it if it is whole.
+
+    `made` is the study's plan; `started` is when the session began.
+    """
     with executor_for(request, store.folder, made.scenario, store.seal) as executor:
         tally, whole = _march_study(store, made, request, started, executor, tell)
     swept = Swept(store.folder, tally, refused=refusals_of(executor))
+    # The last of several shards to end finds the study whole, and judges it.
     if whole and request.shard != Request().shard:
         whole = _is_whole(store)
         swept = replace(swept, part_is_whole=not whole)
@@ -128,12 +132,15 @@ def _march_study(
     executor: Executor,
     tell: Tell,
 ) -> tuple[StudyTally, bool]:
-    """Simulate what is missing, and note the session; how far it is, and if it is whole."""
+    """Simulate what is missing, and note the session; how far the study is, and if it is whole.
+
+    `made` is the study's plan. Raises KeyboardInterrupt with what is kept and how to go on.
+    """
     session = SessionLog(store.folder, request.argv, started, made.scenario.plugged)
     seen = StudyTally(0)
 
     def tell_tally(tally: StudyTally) -> None:
-        """Keep the latest tally, for what is told after an interrupt, and pass it on."""
+        """Keep the latest tally, for the message after an interrupt, and pass it on."""
         nonlocal seen
         seen = tally
         tell(tally)
@@ -161,7 +168,10 @@ def _march_study(
 def _announce(
     folder: Path, made: StudyPlan, request: Request, missing: Gaps, alone: Mapping[str, str]
 ) -> None:
-    """Warn of mixed machines, of invalid draws, and of laws whose runs march one by one."""
+    """Warn of mixed machines, of invalid draws, and of laws whose runs march one by one.
+
+    `missing` counts runs to be made, `alone` says by law why its runs march one by one.
+    """
     if missing and (mixed := mixture(folder)):
         request.warn(mixed)
     if missing and (invalid := check_draws(made)).count:
@@ -177,7 +187,7 @@ def _is_whole(store: Store) -> bool:
 
 
 def _plan_study(config: Config, request: Request) -> tuple[StudyPlan, Path, dict[str, str]]:
-    """A new study, or one that is to be continued: plan, folder, scenario and plug-ins."""
+    """The plan of a study, new or continued, its folder, and the texts that the folder keeps."""
     if there := folder_of(config):
         check_study(there)
     loaded = loaded_for("sweep", NO_SWEEP, config, request, [sweep_faults])
@@ -197,8 +207,8 @@ def answer_study(
 ) -> Swept:
     """Judge the runs that are there, and write everything about them.
 
-    With the plan of the study, the logs that it is to keep are made, too.
-    Tables and verdicts come first. An interrupt then costs figures and kept logs, nothing else.
+    With the plan of the study (`made`), the logs that it is to keep are made, too. Tables and
+    verdicts come first, so an interrupt costs only figures and kept logs.
     """
     with interrupts_deferred():
         results = judge_study(store.about, runs)
@@ -226,7 +236,10 @@ def answer_study(
 
 
 def report(study: Path, request: Request) -> Swept:
-    """Judge a study anew, of the runs that are there. Raises UsageError where there are none."""
+    """Judge a study anew, of the runs that are there; nothing is simulated.
+
+    Raises UsageError where there are no runs, or none that all laws have met.
+    """
     started = datetime.now(UTC)
     check_study(study)
     with sole_writer(study, TABLES):  # as draws and runs may be added until it is locked

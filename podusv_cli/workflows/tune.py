@@ -97,6 +97,7 @@ def _tune_folder(
     """Search what is not there yet, or all anew; no other process writes into the folder."""
     plan, texts = TunePlan(loaded.scenario), scenario_texts(loaded)
     noted = None if request.force else place.read_known(folder, plan)
+    # Found once: a continued search leaves out the same gains.
     plan = replace(plan, idle=noted.idle if noted else _idle(plan, request))
     if not any(plan.gains.values()):
         raise UsageError(
@@ -114,7 +115,7 @@ def _tune_folder(
 
 
 def _load_config(config: Config, request: Request) -> tuple[Loaded, Path]:
-    """The scenario, and the folder of the search."""
+    """The scenario, checked, and the folder of the search. Raises ScenarioError, UsageError."""
     if there := folder_of(config):
         place.check(there)
     loaded = loaded_for("tune", NO_TUNE, config, request, [sweep_faults, tune_faults])
@@ -130,7 +131,10 @@ def _run_search(
     executor: Executor,
     tell: Tell,
 ) -> SearchResults:
-    """Search and validate what is not there yet, and note the session."""
+    """Search and validate what is not there yet, and note the session.
+
+    Raises KeyboardInterrupt with what is kept and how to go on.
+    """
     session = SessionLog(folder, request.argv, started, plan.scenario.plugged)
     made = {"search": 0, "validation": 0}
 
@@ -165,6 +169,7 @@ def _prepare(plan: TunePlan, request: Request) -> None:
     """
     for law, gains in plan.gains.items():
         runs, report = sum(plan.runs_wanted()[law]), compiling(request, law)
+        # A word may choose other code, which is compiled as well.
         options = [{gain.key: word} for gain in gains for word in gain.words]
         for new in options or [{}] if gains else []:
             if with_gains(plan.laws[law], new):
@@ -181,7 +186,7 @@ def _idle(plan: TunePlan, request: Request) -> dict[str, tuple[str, ...]]:
 
 
 def _searches(plan: TunePlan, folder: Path) -> list[GainSearch]:
-    """All of each law with gains, the laws in turn."""
+    """All searches of each law with gains, the laws in turn, so that all advance together."""
     return [
         GainSearch(plan, law, number, folder)
         for number in range(plan.tune.searches)
@@ -191,7 +196,7 @@ def _searches(plan: TunePlan, folder: Path) -> list[GainSearch]:
 
 
 def _leaders(searches: Sequence[GainSearch]) -> str:
-    """The best objective so far of every law, in words."""
+    """The best objective so far of every law, over its searches, in words."""
     best_values: dict[str, float] = {}
     for search in searches:
         if search.leader:

@@ -44,7 +44,7 @@ class Valid:
     study: Sequence[str] = ()
 
     def lines(self) -> Iterator[str]:
-        """What is said of it."""
+        """Lines on the scenario: laws, steps, time and memory of a run, study, findings."""
         scenario = self.loaded.scenario
         laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps
         yield f"ok ({scenario.name}, {laws}, {steps} steps)"
@@ -120,7 +120,7 @@ def _tune_faults(loaded: Loaded) -> list[tuple[Route, str]]:
 
 
 def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
-    """How many runs the study has, and which draws the scenario cannot take."""
+    """Lines on the study: how many runs it has, and which draws the scenario cannot take."""
     from podusv_cli.studies.making.estimate import check_fits
     from podusv_cli.studies.making.invalid import check_draws
     from podusv_cli.studies.making.plan import plan

@@ -39,8 +39,9 @@ def verify(
 ) -> Verification:
     """Verify a scenario's numbers, which `keep` can write to the file `out`.
 
-    Raises UsageError for a run folder, ScenarioError, LawError, and StorageError where `out` is no
-    place for a file, or is another file and not replaced by `force`, before anything is computed.
+    `tolerance` is the relative change that counts as converged. Raises UsageError for a run folder,
+    ScenarioError, LawError, and StorageError where `out` is no place for a file, or is another file
+    and not replaced by `force`, before anything is computed.
     """
     if (config / "resolved.yaml").is_file():
         raise UsageError(f"{config} is a run folder; verify its resolved.yaml")
@@ -52,6 +53,7 @@ def verify(
         files.check_places([out])
         _spare(out, force)
     done = verification.verify(scenario, tolerance, progress)
+    # A looser tolerance than the usual one is no proof for others.
     if not done.unconverged_by_run and tolerance <= TOLERANCE:
         _remember(map(resolved_yaml, scenario.singles().values()))
     return done
@@ -86,7 +88,10 @@ def keep(done: Verification, out: Path, *, force: bool = False) -> None:
 
 
 def _spare(out: Path, force: bool) -> None:
-    """StorageError where `out` holds anything but an earlier verification."""
+    """Raise StorageError where `out` holds anything but an earlier verification.
+
+    With `force`, any file may be replaced.
+    """
     if force or not out.exists() or not out.stat().st_size:
         return
     with suppress(StorageError):

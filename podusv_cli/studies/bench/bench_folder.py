@@ -38,7 +38,11 @@ def write_files(
     provenance: Mapping[str, Any],
     solved: Sequence[Least],
 ) -> None:
-    """Write everything but provenance.json and the manifest. Raises StorageError."""
+    """Write everything but provenance.json and the manifest. Raises StorageError.
+
+    `made` is `standing.table` of the runs, `solved` the optima; their file is written if there are
+    any.
+    """
     writer.add(RUNS, _csv(made))
     writer.add(BOARD, page.as_markdown(made).encode())
     writer.add(REPORT, page.page(made, figures, provenance, solved).encode())

@@ -62,11 +62,16 @@ def shipped_bench() -> Path:
 
 
 def cases(wanted: Selection) -> Iterator[BenchCase]:
-    """All cases, one by one. Raises UsageError for a folder or a name, ScenarioError for a file."""
+    """All cases, one by one: each vessel with each task under each condition, with all laws.
+
+    `wanted` says which of them. Raises UsageError for a folder or a name, ScenarioError for a file.
+    """
     for path in wanted.laws:
         _check_laws(path)
     vessels, tasks, conditions = (_choose_files(wanted, axis) for axis in AXES)
     for vessel, task, condition in product(vessels, tasks, conditions):
+        # Later layers win: a vessel over its task, a condition over both, laws of one's own over
+        # all.
         layers = [
             wanted.folder / LAWS,
             tasks[task],
@@ -74,6 +79,7 @@ def cases(wanted: Selection) -> Iterator[BenchCase]:
             _for_vessel(conditions[condition], vessel),
             *wanted.laws,
         ]
+        # JSON is YAML, too, and quotes what a path may contain.
         names = json.dumps([str(layer.absolute()) for layer in layers])
         text = (
             f"extends: {names}\nname: {task}-{condition}-{vessel}\n"
@@ -85,7 +91,11 @@ def cases(wanted: Selection) -> Iterator[BenchCase]:
 
 
 def _check_laws(path: Path) -> None:
-    """Raise UsageError for a file that has more than laws: it would be in place of every case's."""
+    """Raise UsageError for a file of laws that also sets what tasks, vessels or conditions set.
+
+    It is the last layer, so its vessel would replace that of every case. ScenarioError if
+    unreadable.
+    """
     if path.suffix == ".py":
         raise UsageError(
             f"{path} is Python; write a YAML file with `plugins: [{path.name}]` and the law "
@@ -105,7 +115,11 @@ def _check_laws(path: Path) -> None:
 
 
 def _choose_files(wanted: Selection, axis: str) -> dict[str, Path]:
-    """Files, or folders of conditions, by name."""
+    """The chosen files (folders for conditions that differ by vessel) of an axis, by name.
+
+    `axis` is one of AXES, `wanted` has the folder and the names. Raises UsageError for a folder or
+    a name that there is not.
+    """
     if not (wanted.folder / axis).is_dir():
         raise UsageError(
             f"{wanted.folder} is no bench: it has no folder {axis}; a bench has {LAWS} and the "

@@ -51,7 +51,10 @@ def sketches(runs: Sequence[BenchRun], made: pd.DataFrame) -> Iterator[Sketch]:
 
 
 def profiles(made: pd.DataFrame) -> Figure:
-    """The share of a hull's cases that each law does within so many times the best law's IAE."""
+    """The performance profiles, a panel for each vessel; `made` is `standing.table` of the runs.
+
+    A curve is the share of a vessel's cases in which a law's IAE is at most x times the best law's.
+    """
     vessels = by_vessel(made)
     rows = -(-len(vessels) // BESIDE)
     figure = new_figure(COLUMNS, 2.6 * rows + 0.6)
@@ -66,7 +69,11 @@ def profiles(made: pd.DataFrame) -> Figure:
 
 
 def _profile(axes: Axes, made: pd.DataFrame) -> None:
-    """Draw for each law the share of cases [%] with a ratio to the best of at most x."""
+    """Draw for each law the share of cases [%] with a ratio to the best of at most x.
+
+    `made` has the rows of one vessel.
+    """
+    # Enough points that the steps look upright in print.
     ratios = np.geomspace(1.0, WORST, 300)
     for place, law in enumerate(made.law.unique()):
         color, linestyle, _ = nth_style(place)
@@ -81,10 +88,14 @@ def _profile(axes: Axes, made: pd.DataFrame) -> None:
 
 
 def tracks(runs: Sequence[BenchRun], laws: Sequence[str]) -> Figure:
-    """Small multiples of one vessel: a row a task, a column a law, all conditions together."""
+    """Small multiples of one vessel: a row a task, a column a law, all conditions together.
+
+    `runs` are those of the vessel; `laws` are the columns, the same in each vessel's figure.
+    """
     tasks = list(dict.fromkeys(run.task for run in runs))
     width, height = SMALL * len(laws) + NAMES, SMALL * len(tasks) + TITLES
     figure = Figure(figsize=(width, height), dpi=DPI)
+    # The margins are known; a layout engine is slow for hundreds of panels.
     figure.set_layout_engine("none")
     places = {"left": NAMES / width, "top": 1.0 - TITLES / height, **APART}
     every = figure.subplots(len(tasks), len(laws), squeeze=False, gridspec_kw=places)
@@ -106,19 +117,24 @@ def _fold_name(law: str) -> str:
 
 
 def _small(axes: Axes, runs: Sequence[BenchRun]) -> None:
-    """Draw the tracks of one case, east over north; those that fail in another colour."""
+    """Draw the tracks of a task and a law, east over north; those that fail in another colour."""
     axes.set(xticks=[], yticks=[], aspect="equal")
     for spine in axes.spines.values():
         spine.set_linewidth(0.3)
+    # Good runs last, on top of those that failed.
     for run in sorted(runs, key=lambda run: not run.good):
         axes.plot(*run.track.T[1::-1], color=nth_style(0)[0] if run.good else LOST, linewidth=0.5)
+    # The path of the longest run is complete; all runs of a panel follow the same one.
     longest = max((run.track for run in runs), key=len)
     if len(longest):
         _frame(axes, longest)
 
 
 def _frame(axes: Axes, track: Vector) -> None:
-    """The path, and limits around it and the start; where a lost vessel goes is left out."""
+    """Draw the path grey, and set square limits around it and the start.
+
+    `track` (rows, 4) has x, y, x_d, y_d [m]. A vessel that leaves these limits is cut off.
+    """
     x, y, x_d, y_d = track.T
     axes.plot(y_d, x_d, color="#BBBBBB", linewidth=1.6, zorder=1)
     ends = [np.append(x_d, x[:1]), np.append(y_d, y[:1])]

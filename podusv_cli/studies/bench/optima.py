@@ -53,7 +53,10 @@ class OptimumTask:
 def wanted_optima(
     every: Iterable[BenchCase], runs: Sequence[BenchRun]
 ) -> tuple[list[OptimumTask], list[str]]:
-    """What is to be solved, and a sentence for each actuator or load that cannot be."""
+    """What is to be solved, and a sentence for each actuator or load that cannot be.
+
+    Cases with equal TASK sections share one optimum. `runs` supply the laws to begin from.
+    """
     tasks: dict[str, list[BenchCase]] = {}
     refused: dict[str, None] = {}
     for case in every:
@@ -61,6 +64,7 @@ def wanted_optima(
         try:
             problem(first, "iae")
         except UsageError as error:
+            # The same reason may come from many cases: it is given once, without the case's name.
             refused[str(error).partition(": ")[2]] = None
             continue
         tasks.setdefault(first.model_dump_json(include=TASK), []).append(case)
@@ -68,13 +72,16 @@ def wanted_optima(
 
 
 def _best(cases: Sequence[BenchCase], runs: Sequence[BenchRun]) -> list[str]:
-    """Laws that reached the target in the first of the cases, by IAE."""
+    """At most BEGINNINGS laws that reached the target in the first case, least IAE first."""
     done = [run for run in runs if run.place == cases[0].place and run.good]
     return [run.law for run in sorted(done, key=lambda run: run.metrics["iae"])[:BEGINNINGS]]
 
 
 def least(of: OptimumTask, tell: Callable[[float], None]) -> Least:
-    """The optimum of these cases. Raises NotConvergedError, UsageError without any beginning."""
+    """The optimum of these cases; `tell` is called with the part that is done, from 0 to 1.
+
+    Raises NotConvergedError, and UsageError where no law reached its target.
+    """
     case = of.cases[0]
     places = [case.place for case in of.cases]
     if not of.laws:
@@ -85,6 +92,7 @@ def least(of: OptimumTask, tell: Callable[[float], None]) -> Least:
         for law, scenario in scenarios.items()
     }
     stages = _search_optimum(problem(scenarios[of.laws[0]], "iae"), guesses, tell)
+    # The last two grids: their difference shows how much the finest one still changed.
     before, last = next(reversed(list(pairwise(stages))))
     lowered = before.integral - last.integral
     return Least(places, last.integral, last.step, float(np.nan_to_num(lowered)), last.start)
@@ -93,16 +101,21 @@ def least(of: OptimumTask, tell: Callable[[float], None]) -> Least:
 def _search_optimum(
     asked: OptimumProblem, guesses: Mapping[str, Motion], tell: Callable[[float], None]
 ) -> list[Stage]:
-    """Optima on ever finer grids. Raises NotConvergedError."""
+    """Optima on ever finer grids, the finest last.
+
+    `guesses` are runs of laws to begin from, by name. The next of STEPS is tried where IPOPT finds
+    nothing. Raises NotConvergedError.
+    """
     *first, last = STEPS
     for step in first:
         with suppress(NotConvergedError):
             return collocation.search_optima(asked, guesses, step, lambda _, part: tell(part))[0]
+    # Outside `suppress`: the error of the last attempt is the caller's.
     return collocation.search_optima(asked, guesses, last, lambda _, part: tell(part))[0]
 
 
 def table(optima: Iterable[Least]) -> pd.DataFrame:
-    """A row for each case that has an optimum."""
+    """A row for each case that has an optimum: IAE [m s], finest step [s], and how it was found."""
     rows = [
         (*place, optimum.iae, optimum.step, optimum.lowered, optimum.start)
         for optimum in optima

@@ -41,7 +41,10 @@ def page(
     provenance: Mapping[str, Any],
     optima: Sequence[Least] = (),
 ) -> str:
-    """The page; `made` is `standing.table` of all runs, `with_optima` where there are any."""
+    """The page as HTML.
+
+    `made` is `standing.table` of all runs, `with_optima` where there are any.
+    """
     laws = list(made.law.unique())
     failed = made[made.status != "finished"]
     counts = {f"{name}s": made[name].nunique() for name in PLACE}
@@ -71,7 +74,7 @@ def as_markdown(made: pd.DataFrame) -> str:
 
 
 def _table(made: pd.DataFrame) -> str:
-    """The leaderboard as a table of Markdown."""
+    """The leaderboard of one vessel as a table in Markdown; `made` has its rows."""
     head, *rows = leaderboard_rows(made)
     lines = [head, *([markdown(law), *texts] for law, *texts in rows)]
     joined = [f"| {' | '.join(line)} |\n" for line in lines]
@@ -79,7 +82,11 @@ def _table(made: pd.DataFrame) -> str:
 
 
 def _grids(optima: Sequence[Least]) -> dict[str, Any]:
-    """What the page says of the optima: the finest grid's step, its effect, and their cases."""
+    """What the page says of the optima.
+
+    These are the coarsest of the finest steps [s], the most that a finest grid changed the IAE [m
+    s], and the number of cases.
+    """
     return {
         "step": f"{max(optimum.step for optimum in optima):.2g}",
         "lowered": f"{max(abs(optimum.lowered) for optimum in optima):.1g}",
@@ -88,7 +95,7 @@ def _grids(optima: Sequence[Least]) -> dict[str, Any]:
 
 
 def _heat(made: pd.DataFrame, laws: Sequence[str]) -> Iterator[tuple[str, list[Any]]]:
-    """For every vessel the rows of its table: task, condition, a cell a law, least IAE."""
+    """For every vessel the rows of its heat map: task, condition, a cell a law, IAE of `_least`."""
     for vessel, cases in by_vessel(made).items():
         rows = [
             (task, condition, _cells(case, laws), _least(case))
@@ -103,7 +110,11 @@ def _cells(case: pd.DataFrame, laws: Sequence[str]) -> list[PageCell]:
 
 
 def _cell(ratio: float, why: str) -> PageCell:
-    """A cell of the heat map; the colour goes with the logarithm of the ratio to the best."""
+    """A cell of the heat map for a `ratio` of IAE to the best law's.
+
+    A failure has inf, and `why` it failed. The colour goes with the ratio's logarithm, from PALE at
+    1 to DARK at DARKEST.
+    """
     if not math.isfinite(ratio):
         return PageCell(CROSS, "#f6d5c3", "#7a2b00", why)
     depth = min(math.log(ratio) / math.log(DARKEST), 1.0)

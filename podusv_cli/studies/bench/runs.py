@@ -65,7 +65,10 @@ def crashed_run(case: BenchCase, law: str, cause: str) -> BenchRun:
 
 
 def _run(case: BenchCase, law: str, scenario: Scenario) -> BenchRun:
-    """Simulate one law in one case, and judge whether it ends at its target."""
+    """Simulate one law in one case, and judge whether it ends at its target.
+
+    Raises PodusvError where the loop refuses its numbers.
+    """
     plan = scenario.plan(_thin_grid(scenario.time_grid()))
     recording = to_end(plan, compiled=scenario.simulation.compiled)
     numbers = plan.probe.summary(recording.seen) if recording.seen is not None else {}
@@ -75,6 +78,7 @@ def _run(case: BenchCase, law: str, scenario: Scenario) -> BenchRun:
         return BenchRun(
             case.place, law, recording.status, _first(recording.message), numbers, track
         )
+    # Only runs that follow a path have it; there the legs done decide.
     left = numbers.get("path_done")
     cause = f"{settled:.3g} m off over the steady window"
     if left is not None:

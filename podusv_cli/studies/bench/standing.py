@@ -71,14 +71,17 @@ def table(runs: Iterable[BenchRun]) -> pd.DataFrame:
 
 
 def _number(metrics: Mapping[str, float], name: str) -> float:
-    """A metric, or what stands for it on a path that is followed; NaN where there is neither."""
+    """A metric of a run, or what FOLLOWED has in its place for a followed path.
+
+    NaN without either.
+    """
     return metrics.get(name, metrics.get(FOLLOWED.get(name, ""), np.nan))
 
 
 def with_optima(made: pd.DataFrame, optima: Sequence[Least]) -> pd.DataFrame:
-    """The table with `optimum` [m s], NaN where there is none, and `of_optimum`, IAE over it.
+    """The table `made` with `optimum` [m s] and `of_optimum`, the IAE over it.
 
-    `of_optimum` is inf for a failed run.
+    `optimum` is NaN where none was found. `of_optimum` is inf for a failed run.
     """
     iae = {place: optimum.iae for optimum in optima for place in optimum.places}
     least = [iae.get(place, np.nan) for place in made[PLACE].itertuples(index=False, name=None)]
@@ -110,6 +113,7 @@ def over_tasks(rows: pd.DataFrame) -> tuple[float, float]:
 
     Student's, of the means by task; NaN with fewer than three tasks.
     """
+    # One number a task: cases of a task are not independent, as they share path and speed.
     means = rows.groupby("task")["rank"].mean()
     if len(means) < FEWEST_TASKS:
         return math.nan, math.nan
@@ -209,7 +213,10 @@ def leaderboards(made: pd.DataFrame) -> pd.DataFrame:
 
 
 def leaderboard(made: pd.DataFrame) -> pd.DataFrame:
-    """Of the runs on one hull: a row for each law, the best first by mean rank; see `columns`."""
+    """The leaderboard of one vessel: a row for each law, least mean rank first; see `columns`.
+
+    `made` has the rows of that vessel alone.
+    """
     shown = columns(made)
     rows = {
         law: {column.name: column.of(of_law) for column in shown}
@@ -220,7 +227,10 @@ def leaderboard(made: pd.DataFrame) -> pd.DataFrame:
 
 
 def leaderboard_rows(made: pd.DataFrame) -> list[list[str]]:
-    """The leaderboard of one hull in words: its headings, then a row a law."""
+    """The leaderboard of one vessel as text: its headings, then a row a law.
+
+    `made` has its rows.
+    """
     board, shown = leaderboard(made), [column for column in columns(made) if column.heading]
     rows = [[str(law), *(column.text(row) for column in shown)] for law, row in board.iterrows()]
     return [["law", *(column.heading for column in shown)], *rows]
@@ -234,9 +244,10 @@ def middle(numbers: Iterable[float]) -> float:
 
 
 def profile(made: pd.DataFrame, law: str, ratios: Vector) -> Vector:
-    """Share of all cases in which the law's IAE is at most so many times the best one.
+    """Share of cases in which the law's IAE is at most `ratios` (n,) times the best one: (n,).
 
-    The performance profile of Dolan and More (2002); what it lacks to 1 at the right are failures.
+    `made` has the rows of one vessel. The performance profile of Dolan and More (2002): where it
+    stays below 1, the law failed in the rest of the cases.
     """
     own = np.sort(made.ratio[made.law == law].to_numpy())
     return np.searchsorted(own, ratios, side="right") / len(own)

@@ -100,8 +100,12 @@ class _ExampleStudy:
 
 
 def parse(text: str, laws: Sequence[str], metrics: Mapping[str, MetricAbout]) -> Parsed:
-    """A claim about these laws. Raises ExpressionError."""
+    """A claim (`text`) about these laws and metrics, checked and taken apart.
+
+    Raises ExpressionError.
+    """
     tree = syntax_tree(text, EXAMPLE)
+    # A trial on one draw of ones finds every mistake that the judge would find, by the same walk.
     tried = _Evaluation(_ExampleStudy(laws, list(metrics)), Parsed(tree), metrics)
     tried.condition(tree)
     return Parsed(tree, tuple(tried.links), tuple(dict.fromkeys(tried.laws)))
@@ -113,7 +117,10 @@ def judge(
     level: float,
     metrics: Mapping[str, MetricAbout],
 ) -> list[StudyVerdict]:
-    """A verdict on every claim; the probability that any is wrong is at most 1 - level."""
+    """A verdict on every claim; the probability that any is wrong is at most 1 - level.
+
+    `level` is the confidence of all verdicts together (0.95): Holm's procedure gives each its own.
+    """
     tried = [_Evaluation(runs, c.parsed, metrics, c.claim.tolerance) for c in claims]
     levels = holm(lambda i, level: tried[i].at(level).answer is not None, len(tried), level)
     return [_verdict(c, claim.at(at)) for c, claim, at in zip(claims, tried, levels, strict=True)]
@@ -143,7 +150,10 @@ class _Evaluation(Logic):
 
     @property
     def inside(self) -> float:
-        """The level of each interval."""
+        """The confidence of each interval, by Bonferroni.
+
+        The statistics of the claim share 1 - level equally.
+        """
         return 1.0 - (1.0 - self.level) / self.parsed.statistics
 
     @property
@@ -153,7 +163,7 @@ class _Evaluation(Logic):
 
     @property
     def answer(self) -> bool | None:
-        """Whether the claim holds in all cells, or in none; None where that cannot be told."""
+        """Whether the claim holds: True if in all cells, False if in none, else None."""
         answers = set(self.answers)
         return answers.pop() if len(answers) == 1 else None
 
@@ -176,7 +186,11 @@ class _Evaluation(Logic):
             yield sample.holds(link.sign, link.bound, self.tolerance, self.inside)
 
     def _sample_statistic(self, call: ast.Call) -> Samples:
-        """The statistic's samples, from the draws that all of its laws have been through."""
+        """The samples of the statistic that `call` names, one for each cell.
+
+        Only draws count that all laws of the statistic have been through. The names of these laws
+        are noted. Raises ExpressionError where `call` names no law.
+        """
         walk = OverLaws(self.metrics, self.tolerance, runs=self.runs)
         sample = SAMPLERS[function(call)](call, walk)
         if not walk.names:
@@ -186,12 +200,18 @@ class _Evaluation(Logic):
         return [sample(label, i, used[i]) for i, label in enumerate(self.runs.cells)]
 
     def _used_draws(self, law: str) -> Mask:
-        """Which draws (cells, draws) of a law count: all that are made, or without broken ones."""
+        """The draws of a law that count, True in a mask (cells, draws).
+
+        All that are made count, or, unless `whole`, only those whose run is not broken.
+        """
         done = self.runs.done(law)
         return done if self.whole else done & ~self.runs.broken(law)
 
     def draws_needed(self) -> list[int | None]:
-        """For every comparison that is not decided in a cell, the draws that would decide it."""
+        """The draws that would decide the claim, for every comparison and cell that is still open.
+
+        None where no number of draws would. Call it after `answers`, which makes the samples.
+        """
         return [
             sample.draws_needed(link.sign, link.bound, self.tolerance, self.inside)
             for link in self.parsed.links
@@ -201,7 +221,11 @@ class _Evaluation(Logic):
 
 
 def _compared_statistics(node: ast.Compare) -> Iterator[Link]:
-    """Every statistic of a comparison, on the left of a sign and a number."""
+    """Every comparison of a chain a < b < c as a statistic on the left and a number on the right.
+
+    Two shares compared with each other become one statistic, `alone`: the share of the first among
+    draws where only one of both holds, compared with one half. Raises ExpressionError.
+    """
     sides = [node.left, *node.comparators]
     for left, sign, right in zip(sides, node.ops, sides[1:], strict=False):
         calls = [side for side in (left, right) if not _is_number(side)]
@@ -212,6 +236,7 @@ def _compared_statistics(node: ast.Compare) -> Iterator[Link]:
             first = calls[0] is left
             call, bound = _statistic(calls[0]), number(right if first else left)
             text = ast.unparse(call)
+            # An unknown sign has no mirror image; it is refused below.
             toward = sign if first else MIRRORED.get(type(sign), type(sign))()
         else:
             refuse(node, COMPARED)
@@ -227,6 +252,7 @@ def _name(node: ast.expr) -> str:
 
 
 def _is_number(node: ast.expr) -> bool:
+    """Whether a side of a comparison is made of numbers alone, without a name in it."""
     return not any(isinstance(part, (ast.Name, ast.Attribute)) for part in ast.walk(node))
 
 
@@ -245,7 +271,10 @@ def _check_bound(call: ast.Call, bound: float) -> None:
 
 
 def _verdict(parsed: ParsedStudyClaim, tried: _Evaluation) -> StudyVerdict:
-    """A claim's verdict with its numbers, and what it would be without the broken runs."""
+    """A claim's verdict with its numbers, and what it would be without the broken runs.
+
+    `tried` is the evaluation at the level that Holm's procedure gave this claim.
+    """
     runs, answers = tried.runs, tried.answers
     broken = sum(int(np.sum(runs.broken(law) & runs.done(law))) for law in parsed.parsed.laws)
     others = replace(tried, whole=False, samples={}) if broken else tried

@@ -41,7 +41,11 @@ class OfRuns(Walk):
     signs: ClassVar = SIGNS
 
     def link(self, sign: ast.cmpop, left: ast.expr, a: Any, right: ast.expr, b: Any) -> Condition:
-        """In which draws one side compares so with the next."""
+        """In which draws `a` and `b` (numbers or arrays (cells, draws)) compare as `sign` says.
+
+        Unknown where one is NaN. `left` and `right` are the nodes of the sides, unused here. Where
+        both sides vary, ties are noted in `both_failed` and `close`, which verdicts report.
+        """
         if np.ndim(a) and np.ndim(b):
             failed = np.isinf(a) & np.equal(a, b)
             self.both_failed.append(failed)
@@ -51,13 +55,17 @@ class OfRuns(Walk):
         return Condition(holds & ~unknown, ~holds & ~unknown)
 
     def side(self, node: ast.expr) -> Any:
-        """One number for every run; +inf where a failed run makes it larger than any."""
+        """The value of one side for every run; infinite beyond REAL, where a failure made it so."""
+        # Such as 0 / 0 of two metrics: NaN, which is unknown.
         with np.errstate(all="ignore"):
             values = np.asarray(self.value(node))
         return np.where(np.abs(values) > REAL, np.copysign(np.inf, values), values)
 
     def countable(self, name: str, values: Vector, failed: Mask) -> Vector:
-        """A metric with FAILED, of its sign, in place of infinity; arrays (cells, draws)."""
+        """A metric that can be calculated with: FAILED, with its sign, in place of infinity.
+
+        `values` and the mask `failed` are (cells, draws), as is the result.
+        """
         numbers = worst(self.metrics[name], values, failed)
         return np.where(np.isinf(numbers), np.copysign(FAILED, numbers), numbers)
 
@@ -70,7 +78,7 @@ class OverLaws(OfRuns):
     names: list[str] = field(default_factory=list)  # of the laws that were met in the expression
 
     def quantity(self, node: ast.expr) -> Vector:
-        """`law.metric`."""
+        """The values (cells, draws) of `law.metric`. Raises ExpressionError for anything else."""
         match node:
             case ast.Attribute(value=ast.Name(id=label), attr=name):
                 law, name = self.law(label), known_name(name, self.metrics, "metric")
@@ -80,7 +88,7 @@ class OverLaws(OfRuns):
         refuse(node, "no meaning here; write law.metric, as in a.iae")
 
     def property(self, node: ast.expr) -> Condition:
-        """`finished(law)` or `success(law)`."""
+        """In which draws `finished(law)` or `success(law)` holds. Raises ExpressionError."""
         properties: dict[str, Callable[[str], Mask]] = {
             FINISHED: self.runs.finished,
             SUCCESS: self.runs.success,
@@ -97,7 +105,10 @@ class OverLaws(OfRuns):
         return self.law(node.args[0].id)
 
     def law(self, label: str) -> str:
-        """The law, noted. Raises ExpressionError with the nearest name where there is none."""
+        """The law of this name, also added to `names`.
+
+        Raises ExpressionError where there is none.
+        """
         self.names.append(known_name(label, self.runs.laws, "law"))
         return label
 
@@ -110,7 +121,7 @@ class OfOneRun(OfRuns):
     ended: Mask = field(kw_only=True)
 
     def quantity(self, node: ast.expr) -> Vector:
-        """A metric's name."""
+        """The values of a metric that is named alone, NaN where a run did not finish."""
         if not isinstance(node, ast.Name):
             refuse(node, "write metrics by their names alone, as in finished and z_e_steady <= 1.5")
         name = known_name(node.id, self.metrics, "metric")
@@ -118,7 +129,10 @@ class OfOneRun(OfRuns):
         return np.where(self.ended, self.countable(name, values, ~self.ended), np.nan)
 
     def property(self, node: ast.expr) -> Condition:
-        """`finished`."""
+        """Whether runs finished: `finished` is the only property that stands alone.
+
+        Raises ExpressionError for anything else.
+        """
         if not isinstance(node, ast.Name):
             refuse(node, "not a condition; compare metrics with numbers, or write finished alone")
         known_name(node.id, (FINISHED,), "property")
@@ -135,19 +149,20 @@ def parse_success(text: str, metrics: Mapping[str, MetricAbout]) -> ast.expr:
 def judge_success(
     tree: ast.expr, values: Mapping[str, Vector], finished: Mask, metrics: Mapping[str, MetricAbout]
 ) -> Mask:
-    """Which runs (cells, draws) of a law are a success; one is not where that is unknown.
+    """Which runs (cells, draws) of a law are a success; a run is none where that is unknown.
 
-    `values` has each metric of the tree, in the same shape.
+    `tree` is what `parse_success` returns. `values` has each metric of the tree and `finished` says
+    which runs reached their end, all (cells, draws).
     """
     held = OfOneRun(metrics, values=values, ended=finished).condition(tree).yes
     return np.broadcast_to(held, np.shape(finished))
 
 
 def shortfalls(tree: ast.expr, runs: OfOneRun, kept: bool = True) -> Iterator[Vector]:
-    """By how much every run misses each comparison of a condition, in their order.
+    """By how much every run misses each comparison of a condition, in their order; (cells, draws).
 
     0 where it holds, infinite where what has to happen never did, NaN where a number is unknown.
-    `kept` is False within a `not`.
+    `kept` is False within a `not`, where the comparison must fail instead.
     """
     match tree:
         case ast.BoolOp(values=parts):

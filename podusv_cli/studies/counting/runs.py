@@ -44,7 +44,7 @@ class Unit:
         return range(self.first, self.first + self.count)
 
     def halves(self) -> tuple[Unit, Unit]:
-        """The unit as two, to find a run that crashes."""
+        """The unit as two halves; repeated halving finds the run that crashes a process."""
         half = self.count // 2
         return (
             Unit(self.law, self.cell, self.first, half),
@@ -105,7 +105,8 @@ class StudyRuns(Protocol):
 def worst(about: MetricAbout, values: Vector, failed: Mask) -> Vector:
     """A metric with the worst for `failed` runs and for the time of what never happened.
 
-    That is +inf, or -inf of a metric of which more is better. All arrays (cells, draws).
+    The worst is +inf, or -inf for a metric of which more is better (`about.margin`). A time that is
+    NaN belongs to an event that never happened (`about.happens`). All arrays are (cells, draws).
     """
     never = np.isnan(values) if about.happens else False
     return np.where(failed | never, -np.inf if about.margin else np.inf, values)

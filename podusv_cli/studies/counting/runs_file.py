@@ -52,7 +52,10 @@ def digest(pieces: Iterable[Any]) -> str:
 
 
 def digest_of_the_rest(file: h5py.File) -> str:
-    """A digest of all that SEAL does not cover: names, types and content."""
+    """SHA-256 of all that SEAL does not cover: axes, causes and drawn quantities.
+
+    Names and types are included, so that no two columns can be exchanged.
+    """
     names = [*AXES, *FAILED]
     if DRAWN in file:
         file[DRAWN].visititems(
@@ -70,7 +73,11 @@ class RunsTable:
     """runs.h5, open for reading, as `StudyRuns`; arrays are read when they are asked for."""
 
     def __init__(self, path: Path, success: str, known: Known) -> None:
-        """`success` is the expression for a run's. Raises StorageError for a damaged file."""
+        """Open `path`.
+
+        `success` is the condition that makes a run a success, in the language of expressions;
+        `known` has the metrics that it may name. Raises StorageError for a damaged file.
+        """
         self.path, self._known, self._successes = path, known, dict[str, Mask]()
         self._success = parse_success(success, known)
         self._open = ExitStack()
@@ -82,7 +89,7 @@ class RunsTable:
             self.wanted = len(self._file["draw"])
 
     def check(self) -> None:
-        """Raises StorageError where a number or a word is not as it was written."""
+        """Compare the content with its digests. Raises StorageError where anything was altered."""
         with hdf5.readable(self.path, "runs"):
             arrays = (self._file[name] for name in ("status", "until", *self.metrics))
             digests = {SEAL: digest(law for array in arrays for law in array)}
@@ -133,7 +140,10 @@ class RunsTable:
         return np.isin(self.status(law), [STATUSES.index(word) for word in BROKEN])
 
     def success(self, law: str) -> Mask:
-        """Whether a run was a success. Kept, as all tables and claims ask again and again."""
+        """Whether a run was a success, a mask (cells, draws).
+
+        It is computed once a law, since it is asked often.
+        """
         if law not in self._successes:
             successes = judge_success(
                 self._success, self._read(law), self.finished(law), self._known
@@ -162,7 +172,7 @@ class RunsTable:
 
     @property
     def drawn_quantities(self) -> dict[str, Any]:
-        """The drawn quantities, one entry a draw."""
+        """The drawn quantities by name, each (draws,): numbers, or an array of words."""
         columns: dict[str, Any] = {}
 
         def note(name: str, thing: Any) -> None:  # returns None, so that all are visited
@@ -182,7 +192,7 @@ class RunsTable:
         return dict(zip(runs, (c.decode() for c in self._file["failed_cause"][()]), strict=False))
 
     def results(self) -> Iterator[UnitResult]:
-        """The runs that are made, as units."""
+        """The runs that are made, as units of at most ROWS draws, so that memory stays small."""
         for position, law in enumerate(self.laws):
             status = self.status(law)
             for cell in range(len(self.cells)):
@@ -192,7 +202,10 @@ class RunsTable:
                         yield self._unit(position, law, cell, part, status[cell])
 
     def _unit(self, place: int, law: str, cell: int, rows: range, status: Codes) -> UnitResult:
-        """The results of these rows (draws) of a law and cell; `status` has all draws' codes."""
+        """The results of some draws (`rows`) of a law in a cell; `place` is the law's position.
+
+        `status` has the codes of all draws.
+        """
         part = slice(rows.start, rows.stop)
         return UnitResult(
             Unit(law, cell, rows.start, len(rows)),
@@ -204,6 +217,7 @@ class RunsTable:
 
 
 def stretches(there: Any) -> list[range]:
-    """The ranges of positions where a mask is true."""
+    """The maximal ranges of positions where the mask `there` (n,) is true, in order."""
+    # A False at either end makes every stretch begin and end with a change.
     edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
     return [range(first, stop) for first, stop in edges.reshape(-1, 2).tolist()]

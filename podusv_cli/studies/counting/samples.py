@@ -52,9 +52,9 @@ class Sample(ABC):
         """
 
     def holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
-        """Whether the comparison holds all over the interval, or nowhere in it; else None.
+        """Whether the comparison holds at both ends of the interval, at none, or else (None).
 
-        `bound`, `margin` and `level` as in `draws_needed`.
+        `bound`, `margin` and `level` as in `draws_needed`. None as well where there are no draws.
         """
         span, margin = self.interval(level), margin if self.has_margin else 0.0
         ends = [bool(SIGNS[type(sign)](end, bound, margin)) for end in (span.low, span.high)]
@@ -94,7 +94,7 @@ class Discordant(Sample):
     has_margin = False
 
     def interval(self, level: float) -> Interval:
-        """Clopper and Pearson's interval at this level."""
+        """Clopper and Pearson's interval at this level; undecided draws could be in either part."""
         if not self.differ + self.unknown:
             return Interval(math.nan, 0.0, 1.0)
         return statistics.share(self.first, self.differ + self.unknown, level, self.unknown)
@@ -102,7 +102,7 @@ class Discordant(Sample):
     def draws_needed(
         self, sign: ast.cmpop, bound: float, margin: float, level: float
     ) -> int | None:
-        """As if the shares of draws with one alone stayed as they are."""
+        """As if the shares of draws with one alone stayed as they are: scaled up to all draws."""
         if not self.differ:
             return None
         more = statistics.draws_for_share(self.first / self.differ, bound, level)
@@ -126,7 +126,10 @@ class Quantile(Sample):
     def draws_needed(
         self, sign: ast.cmpop, bound: float, margin: float, level: float
     ) -> int | None:
-        """As if the share of values beyond the bound stayed as it is, which decides just so."""
+        """As if the share of values within the bound stayed as it is.
+
+        A quantile at share q lies below a bound if, and only if, a share q of the values does.
+        """
         if not self.n:
             return None
         held = float(np.mean(SIGNS[type(sign)](self.values, bound, margin)))
@@ -141,19 +144,23 @@ Sampler = Callable[[str, int, Mask], Sample]
 
 
 def _condition(call: ast.Call, walk: OverLaws) -> Condition:
-    """What a share is of."""
+    """In which draws (cells, draws) the condition holds whose share is wanted.
+
+    That is the argument of `share`, or for `failures(law)` that the law's run is no success.
+    """
     if function(call) == FAILURES:
         return Condition.known_everywhere(~walk.runs.success(walk.only(call)))
     return walk.condition(_arguments(call, 1, "one condition, as in share(a.iae < b.iae)")[0])
 
 
 def _share(call: ast.Call, walk: OverLaws) -> Sampler:
-    """Counts the draws in which a condition holds."""
+    """A sampler that counts, in one cell, the draws in which a condition holds."""
     held = _condition(call, walk)
 
     def sample(label: str, cell: int, used: Mask) -> Share:
         """The count in a cell among the draws `used` (draws,); unknown where it is undecided."""
 
+        # Of a mask (cells, draws).
         def count(where: Mask) -> int:
             return int(np.sum(where[cell] & used))
 
@@ -166,7 +173,7 @@ def _share(call: ast.Call, walk: OverLaws) -> Sampler:
 
 
 def _discordant(call: ast.Call, walk: OverLaws) -> Sampler:
-    """Counts the draws in which one of two conditions holds and the other does not."""
+    """A sampler that counts, in one cell, the draws in which only one of two conditions holds."""
     first, second = (_condition(share, walk) for share in call.args if isinstance(share, ast.Call))
 
     def sample(label: str, cell: int, used: Mask) -> Discordant:
@@ -198,7 +205,10 @@ DRAWS = Wording("draw", "a.iae", "a.iae / b.iae")
 
 
 def part_of(call: ast.Call, wording: Wording) -> tuple[ast.expr, float]:
-    """What a median or quantile is of, and its share from 0 to 1. Raises ExpressionError."""
+    """The expression that a median or quantile is taken of, and its share from 0 to 1.
+
+    `wording` has the examples for messages. Raises ExpressionError.
+    """
     if function(call) == MEDIAN:
         wanted = f"one number of each {wording.each}, as in median({wording.ratio})"
         return _arguments(call, 1, wanted)[0], statistics.MEDIAN
@@ -210,7 +220,7 @@ def part_of(call: ast.Call, wording: Wording) -> tuple[ast.expr, float]:
 
 
 def _at_share(node: ast.expr, q: float, walk: OverLaws) -> Sampler:
-    """Takes the quantile at share `q` of a number over the draws."""
+    """A sampler for the quantile at share `q` (0 to 1) of the expression `node` over the draws."""
     values = walk.side(node)
 
     def sample(label: str, cell: int, used: Mask) -> Quantile:

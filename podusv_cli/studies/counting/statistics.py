@@ -33,7 +33,10 @@ class Interval(NamedTuple):
 
     @classmethod
     def of(cls, row: Any, name: str) -> Self:
-        """That of a number in a row of a table, which has it in `columns`."""
+        """The interval of the number `name` in a row of a table.
+
+        Its columns are those that `columns` names.
+        """
         return cls(row[name], row[f"{name}_low"], row[f"{name}_high"])
 
     def columns(self, name: str) -> dict[str, Any]:
@@ -47,8 +50,9 @@ class Interval(NamedTuple):
     def text(self, form: str = "", infinite: str = "failed") -> str:
         """`0.12 [0.1, 0.14]`, or the estimate alone where there is no interval.
 
-        With a % at its end the form is that of percentages; an empty one is as `digits`. Where the
-        ends print as the estimate does, words take their place.
+        `form` is a format as `.3g`; with a % at its end the numbers are shares, printed in percent.
+        An empty `form` is `.5g`. `infinite` is the word for an estimate or end of +inf. Where both
+        ends print like the estimate, the words "no spread" take their place.
         """
         estimate, low, high = self._texts(form, infinite)
         whole = estimate + self._percent(form)
@@ -56,6 +60,7 @@ class Interval(NamedTuple):
             return whole
         if not low == estimate == high:
             return f"{whole} [{low}, {high}]"
+        # The word for infinity says enough: "failed, no spread" would say no more.
         return whole if np.isinf(self.estimate) else f"{whole}, no spread"
 
     def ends(self, form: str, infinite: str = "failed") -> str:
@@ -69,13 +74,20 @@ class Interval(NamedTuple):
         return " %" if form.endswith("%") else ""
 
     def _texts(self, form: str, infinite: str) -> list[str]:
-        """Estimate, low and high as text; a form that ends in % is in percent."""
+        """Estimate, low and high as text.
+
+        `form` and `infinite` as in `text`, without the % sign itself.
+        """
         factor, form = (100.0, form[:-1]) if form.endswith("%") else (1.0, form)
         return [digits(factor * number, form or ".5g", infinite) for number in self]
 
 
 def digits(number: float, form: str = ".5g", infinite: str = "failed") -> str:
-    """A number over all draws; `infinite` says what its being infinite means, NaN is a dash."""
+    """A number of a study as text in the format `form`: a dash for NaN.
+
+    `infinite` is the word for +inf (a failed run makes it so); -inf is an interval without lower
+    limit.
+    """
     if np.isnan(number):
         return "-"
     if np.isinf(number):
@@ -86,11 +98,14 @@ def digits(number: float, form: str = ".5g", infinite: str = "failed") -> str:
 def share(yes: Any, n: Any, level: float, unknown: Any = 0) -> Interval:
     """A probability, from how often it happened in n draws: Clopper and Pearson's exact interval.
 
-    Of `unknown` draws nobody knows whether it happened.
+    `yes` of `n` draws had it, and of `unknown` draws nobody knows: numbers, or arrays of one shape.
+    `level` is the confidence, as 0.95. The estimate counts unknown draws as no. The low end counts
+    them as no as well, the high end as yes.
     """
     from scipy.special import betaincinv  # slow to import
 
     tail, n, most = (1.0 - level) / 2.0, np.asarray(n, float), np.add(yes, unknown)
+    # Both branches of `where` are computed: betaincinv has no value at 0 of n and at n of n.
     with np.errstate(all="ignore"):
         low = np.where(np.equal(yes, 0), 0.0, betaincinv(yes, n - yes + 1.0, tail))
         high = np.where(np.equal(most, n), 1.0, betaincinv(most + 1.0, n - most, 1.0 - tail))
@@ -98,16 +113,21 @@ def share(yes: Any, n: Any, level: float, unknown: Any = 0) -> Interval:
 
 
 def quantile(values: Vector, q: float, level: float) -> Interval:
-    """The q-quantile, between two of the sorted values; valid for any distribution.
+    """The q-quantile of `values` (n,), between two of the sorted values.
 
-    The estimate is the smallest value that a share q of the values does not exceed. An end is
-    infinite where there are too few values for one.
+    The interval is valid for any distribution. The estimate is the smallest value that a share q of
+    the values does not exceed. An end is infinite where there are too few values for one. `level`
+    is the confidence, as 0.95.
     """
     return quantiles(values, (q,), level)[0]
 
 
 def quantiles(values: Vector, shares: Sequence[float], level: float) -> list[Interval]:
-    """Several quantiles of `values` (n,) with intervals of this level; sorted once for all."""
+    """Quantiles of `values` (n,) at each of `shares` (0 to 1), with intervals of this level.
+
+    `values` is sorted once for all of them, and `level` is the confidence. NaN counts as +inf for
+    the estimate and the high end, and as -inf for the low end: an unknown value could be either.
+    """
     n = values.shape[-1]
     unknown = np.isnan(values).any()
     high = np.sort(np.where(np.isnan(values), inf, values), axis=-1)
@@ -123,15 +143,19 @@ def quantiles(values: Vector, shares: Sequence[float], level: float) -> list[Int
 
 
 def _middle(n: int, q: float) -> int:
-    """The smallest rank whose share of n is q or more, but for rounding."""
+    """The rank (from 1) of the q-quantile's estimate: the smallest whose share of n is q or more.
+
+    The factor keeps rounding in q * n, as in 0.07 * 100 > 7, from raising the rank by one.
+    """
     return min(max(int(np.ceil(q * n * (1.0 - 1e-12))), 1), n)
 
 
 @cache
 def _rank(n: int, q: float, level: float) -> int:
-    """The rank of the lower end: the largest r so that r - 1 values or fewer lie below seldom.
+    """The rank (from 1) of the lower end of the q-quantile's interval; 0 where n is too small.
 
-    Of `n` draws, for the quantile at share `q`; seldom is half of 1 - `level`.
+    It is the largest r for which r - 1 or fewer of `n` draws lie below the quantile with a
+    probability of at most (1 - level) / 2. `q` is from 0 to 1, `level` the confidence.
     """
     from scipy.special import bdtr  # slow to import
 
@@ -176,9 +200,10 @@ class Pairs:
 
 
 def pairs(a: Vector, b: Vector, margin: float) -> Pairs:
-    """The comparison of two laws that met the same draws; `a` and `b` (draws,), inf for a failure.
+    """Compare one metric of two laws that met the same draws; less is better.
 
-    Values closer than `margin`, in parts, are a tie.
+    `a` and `b` (draws,) are its values: inf for a failed run, NaN for an unknown one. Values that
+    differ by at most `margin`, relative to the larger of the two, are a tie.
     """
     wins, losses = below(a, b, margin), below(b, a, margin)
     failed, unknown = np.isposinf(a) & np.isposinf(b), np.isnan(a) | np.isnan(b)
@@ -186,18 +211,25 @@ def pairs(a: Vector, b: Vector, margin: float) -> Pairs:
 
 
 def ratios(a: Vector, b: Vector) -> Vector:
-    """a / b in each draw: 1 where both failed or both are 0, inf and 0 where one of them failed."""
+    """a / b (draws,), defined where runs failed, too.
+
+    Equal values, also two failures or two zeros, have 1. The ratio is inf where only a failed, and
+    0 where only b did.
+    """
     with np.errstate(all="ignore"):
         return np.where(np.equal(a, b), 1.0, np.where(np.isposinf(a), inf, a / b))
 
 
 def draws_for_share(estimate: float, bound: float, level: float) -> int | None:
-    """Draws after which a share's interval would leave the bound out, were the share as estimated.
+    """How many draws it takes until a share's interval leaves out `bound`.
 
-    None where no number of draws would do, because the estimate lies on the bound.
+    The share is taken to stay as it is. `estimate` and `bound` are shares from 0 to 1, `level` is
+    the confidence. None where no number of draws would do: the estimate lies on the bound, or more
+    than MOST draws are needed.
     """
     from scipy.special import betainc  # slow to import
 
+    # Mirrored, so that only the lower end of the interval has to pass the bound.
     if estimate < bound:
         estimate, bound = 1.0 - estimate, 1.0 - bound
     tail = (1.0 - level) / 2.0
@@ -206,6 +238,7 @@ def draws_for_share(estimate: float, bound: float, level: float) -> int | None:
         yes = estimate * n
         return bool(betainc(yes, n - yes + 1.0, bound) <= tail)
 
+    # A difference of rounding alone, such as 0.95 of 1 - 0.05.
     if estimate - bound <= 1e-12:
         return None
     count = 1 + bisect_left(range(1, MOST + 1), True, key=decides)
@@ -215,7 +248,7 @@ def draws_for_share(estimate: float, bound: float, level: float) -> int | None:
 def holm(decides: Callable[[int, float], bool], count: int, level: float) -> list[float]:
     """The level of each of `count` claims by Holm's step-down procedure.
 
-    `decides(i, level)` tells whether claim i is decided by intervals of this level. The claims
+    `decides(i, level)` says whether claim i is decided by intervals of this level. The claims
     that are still open share 1 - level equally; each that is decided leaves more to the others.
     The probability that any claim is decided wrongly is then at most 1 - level.
     """
@@ -225,6 +258,7 @@ def holm(decides: Callable[[int, float], bool], count: int, level: float) -> lis
         for i in left:
             levels[i] = each
         undecided = [i for i in left if not decides(i, each)]
+        # Nothing more is decided, so the level of those that are left cannot become easier.
         if len(undecided) == len(left):
             break
         left = undecided
@@ -245,11 +279,12 @@ def centre_ranks(values: Vector) -> Vector:
 def rank_correlations(quantities: Mapping[str, Vector], metric: Vector) -> dict[str, float]:
     """Spearman's rank correlation of a metric (draws,) with every quantity, by name.
 
-    A quantity (draws,) is given as `centre_ranks` makes it. Of the draws where the metric is known;
-    NaN where one of the two does not vary.
+    A quantity (draws,) is given as `centre_ranks` makes it, once for all metrics. Draws without the
+    metric (NaN) are left out. NaN where one of the two does not vary.
     """
     known = ~np.isnan(metric)
     y, whole = centre_ranks(metric[known]), bool(known.all())
+    # Where no draw is left out, the ranks of all draws serve as they are.
     return {
         name: _cosine(x if whole else centre_ranks(x[known]), y) for name, x in quantities.items()
     }
@@ -261,9 +296,9 @@ def _cosine(x: Vector, y: Vector) -> float:
 
 
 def by_chance(n: int, level: float) -> float:
-    """The rank correlation that unrelated quantities stay within, on either side, in `n` draws.
+    """The rank correlation that two unrelated quantities stay within, on either side, in `n` draws.
 
-    At this `level`, as 0.95.
+    It is the normal approximation z / sqrt(n - 1) at this `level`, as 0.95; 1 where n is too small.
     """
     from scipy.special import ndtri  # slow to import
 

@@ -34,7 +34,10 @@ class Statistic:
 
     @classmethod
     def of(cls, statistic: str, sample: Sample, level: float) -> Self:
-        """The part that a sample gives."""
+        """The statistic of a sample, with its interval at the confidence `level`.
+
+        `statistic` is its text in the claim.
+        """
         estimate, low, high = map(float, sample.interval(level))
         return cls(
             statistic,
@@ -62,7 +65,10 @@ class Statistic:
         return f"{self.statistic}{at} = {interval:.4g} ({', '.join(counts)})"
 
     def as_json(self) -> dict[str, object]:
-        """Plain data; what is infinite or undefined is None."""
+        """Plain data; what is infinite or undefined is None.
+
+        A study without a grid has no `cell`.
+        """
         return {k: _plain(v) for k, v in vars(self).items() if v != "" or k != "cell"}
 
 
@@ -103,7 +109,7 @@ class StudyVerdict(Verdict):
         return "; ".join([*(part.in_words() for part in self.parts), *self.reasons()])
 
     def reasons(self) -> Iterator[str]:
-        """What a reader has to know beside the numbers."""
+        """Sentences to read beside the numbers: level, missing draws, open answer, broken runs."""
         yield f"intervals at {100 * self._inside:.4g} %"
         if self.preliminary:
             yield f"preliminary: {self.draws} of {self.wanted} draws"
@@ -120,7 +126,10 @@ class StudyVerdict(Verdict):
         return self.parts[0].level if self.parts else self.level
 
     def _doubt(self) -> str:
-        """Why the answer is "cannot tell", and what would change that."""
+        """Why the answer is "cannot tell", and what would change that.
+
+        The reasons come in the order in which they explain: without runs nothing else matters.
+        """
         if not self.draws:
             return "no draw has runs of all laws in the claim"
         if None not in self.by_cell.values():

@@ -28,9 +28,10 @@ class _Before(StudyIdentity):
 
 
 def about(folder: Path, scenario: Callable[[], Scenario]) -> StudyAbout:
-    """What a study says about itself; `scenario` is asked for where its study.json is old.
+    """What a study says about itself, also where an older podusv wrote its study.json.
 
-    Raises StorageError, and what `scenario` raises.
+    An old file lacks what follows from the scenario; only then `scenario` is called, which loads
+    it. Raises StorageError, and what `scenario` raises.
     """
     if json_files.read(folder / STUDY).get("format") != FORMAT:
         return record.read(folder)
@@ -38,6 +39,7 @@ def about(folder: Path, scenario: Callable[[], Scenario]) -> StudyAbout:
     known = {name: metric.about for name, metric in own.known_metrics().items()}
     foreign = before.metrics_of_plugins.items()
     known |= {name: MetricAbout(name=name, **facts) for name, facts in foreign if name not in known}
+    # Old files do not name the metrics that were measured; the runs have them.
     there = {*_metrics_measured(folder, digest(before.identity))}
     return record.of_scenario(
         own,
@@ -50,7 +52,10 @@ def about(folder: Path, scenario: Callable[[], Scenario]) -> StudyAbout:
 
 
 def _metrics_measured(folder: Path, seal: str) -> Iterator[str]:
-    """The metrics of the runs that are there."""
+    """The metrics of the runs in the folder, perhaps more than once.
+
+    `seal` is the digest of the study's identity.
+    """
     if (folder / RUNS).exists():
         yield from RunsTable(folder / RUNS, FINISHED, {}).metrics
     for path in (folder / UNITS).glob("*.unit"):

@@ -51,7 +51,10 @@ def cells(loaded: Loaded, check: Check | None = None) -> tuple[Cell, ...]:
 def _make_cells(
     loaded: Loaded, check: Check | None, faults: dict[Hashable, None]
 ) -> Iterator[Cell]:
-    """The cells of the grid in order, last key fastest; faults of those that do not load."""
+    """The cells of the grid in order, the last key changing fastest.
+
+    `faults` collects what is wrong with cells that do not load, each once; a dict keeps the order.
+    """
     grid = _grid(loaded)
     for index, nodes in enumerate(product(*grid.values())):
         each = [tree_with(key, node, loaded.root) for key, node in zip(grid, nodes, strict=True)]
@@ -59,6 +62,7 @@ def _make_cells(
         values = tuple(zip(grid, map(plain, nodes), strict=True))
         checks = [_within(check, _label(values))] if check else []
         try:
+            # A cell is the scenario's own tree with the grid's values laid over it.
             scenario = (
                 loaded.merge_over(top, checks)
                 if grid
@@ -82,7 +86,7 @@ def _within(check: Check, label: str) -> Check:
 
 
 def _grid(loaded: Loaded) -> dict[str, tuple[Node, ...]]:
-    """The values of each key in podusv's units, with their places in the scenario's file."""
+    """The nodes of each key's values under `sweep.grid`, in podusv's units, with their places."""
     grid = find(loaded.filled, ("sweep", "grid"))
     entries = grid.mapping.items() if grid else ()
     return {key: node.content for key, node in entries if node.content is not None}
@@ -113,7 +117,7 @@ def _wrong(key: str, nodes: tuple[Node, ...]) -> Iterator[str]:
 
 
 def _fault(loaded: Loaded, key: str, text: str) -> Fault:
-    """A fault at a key of the grid, or at the grid itself."""
+    """A fault at a key of the grid; at the grid itself for an empty `key`."""
     place = ("sweep", "grid", *([key] if key else []))
     node = find(loaded.root, place)
     mark = node.key_mark or node.mark if node else loaded.root.mark

@@ -39,7 +39,7 @@ Faults = Iterator[tuple[Route, str]]
 
 
 def sweep_faults(loaded: Loaded) -> list[tuple[Route, str]]:
-    """Steps of the key and message for everything that is wrong; nothing without a sweep."""
+    """Everything that is wrong with `sweep`: the steps to the key, and a message for it."""
     scenario, sweep = loaded.scenario, loaded.scenario.sweep
     if sweep is None:
         return []
@@ -47,6 +47,7 @@ def sweep_faults(loaded: Loaded) -> list[tuple[Route, str]]:
     # What contradicts itself without a draw does so with every one.
     whole = not (loaded.contradictions or loaded.clashes)
     draws = _vary(singles(scenario), loaded.plans, sweep) if whole else ()
+    # An unknown law would make every other check fail as well.
     return laws or [
         *_metric_names(scenario),
         *draws,
@@ -57,9 +58,10 @@ def sweep_faults(loaded: Loaded) -> list[tuple[Route, str]]:
 
 
 def unjudged_claims(scenario: Scenario) -> str:
-    """A sentence about the claims that a study does not judge; empty where there are none.
+    """A warning that a study does not judge the scenario's claims about single runs, or "".
 
-    Also where the study says itself what it judges: then both are meant, each for its command.
+    None is due where the study has claims or a success of its own: then both are meant, each for
+    its command.
     """
     sweep = scenario.sweep
     judges = sweep and (sweep.claims or sweep.success != Sweep().success)
@@ -97,7 +99,11 @@ def _metric_names(scenario: Scenario) -> Faults:
 
 
 def _vary(laws: Mapping[str, Scenario], plans: Mapping[str, Plan], sweep: Sweep) -> Faults:
-    """Drawn quantities whose name, key or values no law can take; one fault each if possible."""
+    """Drawn quantities whose name, key or values no law can take; one fault each if possible.
+
+    `laws` are the scenarios and `plans` the loops, by law.
+    """
+    # Two loops of one structure march in the same compiled code; probes are no part of it.
     own = {law: replace(plans[law], probe_for=no_probe).structure for law in laws}
     taken = {
         *AXES,
@@ -112,6 +118,8 @@ def _vary(laws: Mapping[str, Scenario], plans: Mapping[str, Plan], sweep: Sweep)
     sound = {
         name: q for name, q in sweep.vary.items() if not (wrong_names[name] or wrong_keys[name])
     }
+    # One trial of all at once is fast; only if it fails is each quantity tried alone, for a
+    # message.
     together = _are_taken_together(sound, laws, own)
     for name, quantity in sweep.vary.items():
         if wrong_names[name]:
@@ -125,7 +133,10 @@ def _vary(laws: Mapping[str, Scenario], plans: Mapping[str, Plan], sweep: Sweep)
 
 
 def _wrong_name(name: str, quantity: Quantity, taken: Collection[str]) -> str:
-    """Why a quantity cannot be a column of the table of runs under this name; else empty."""
+    """Why a quantity cannot be a column of the table of runs under this name; else empty.
+
+    `taken` has the names of the other columns. A name that is the key itself is always free.
+    """
     if name in quantity.targets(name):
         return ""
     if not NAME.fullmatch(name):
@@ -142,6 +153,7 @@ def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator
     if section not in PER_RUN and section in Scenario.model_fields:
         yield f"{section} is the same for all runs of a cell; list values of {key} under grid"
         return
+    # Laws without the key would get no draw, so that the study would compare unlike runs.
     lacking = [law for law, single in laws.items() if not has(single, key)]
     if len(lacking) == len(laws):
         near = did_you_mean(key, _numbers(laws))
@@ -158,7 +170,10 @@ def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator
 
 
 def no_section(scenario: Scenario, steps: Route) -> str:
-    """Which section on the way is null, where it could have the key; else empty."""
+    """The message for a key inside a section that is null; empty where that is not the reason.
+
+    `steps` lead to the key, such as ("disturbance", "wind", "speed").
+    """
     for end in range(1, len(steps)):
         at, inner = dotted_key(steps[:end]), dotted_key(steps[end:])
         if not has(scenario, at):
@@ -184,7 +199,7 @@ def _is_number(own: Any) -> bool:
 
 
 def _type(key: str, quantity: Quantity, scenario: Scenario) -> Iterator[str]:
-    """What is wrong with the kind of value that the key has."""
+    """What is wrong with the kind of value at `key` for the way in which `quantity` is drawn."""
     steps = route(key)
     own, way = content(scenario, steps), quantity.given_keys[0]
     words = describe_key(scenario, steps).choices or (isinstance(own, bool) and ("true", "false"))
@@ -192,6 +207,7 @@ def _type(key: str, quantity: Quantity, scenario: Scenario) -> Iterator[str]:
         yield f"a draw cannot change {key}; list its values under grid"
     elif quantity.seed and int not in describe_key(scenario, steps).types:
         yield f"{key} cannot be drawn as a seed, since it is not a whole number"
+    # `way` then names the distribution, not the operation (set, add, scale).
     elif is_whole(describe_key(scenario, steps)) and (way := _real(quantity)):
         seed = "seed: true or " if steps[-1] == "seed" else ""
         yield f"{key} is a whole number, and {way} draws others; write {seed}integers: [low, high]"
@@ -216,8 +232,9 @@ def _are_taken_together(
 ) -> bool:
     """Whether every law takes all quantities at once, each at every value that is tried of it.
 
-    A loop is built for each round, not for each quantity. A round that fails says nothing of which
-    quantity is to blame: then each has to be tried alone.
+    `own` has the structure of each law's loop before any draw. A loop is built for each round, not
+    for each quantity. A round that fails does not show which quantity is to blame: then each has to
+    be tried alone.
     """
     draws = _rounds({name: _values_to_try(quantity) for name, quantity in quantities.items()})
     try:
@@ -231,9 +248,11 @@ def _are_taken_together(
 
 
 def _rounds(values: Mapping[str, list[Any]]) -> list[dict[str, Any]]:
-    """Every value of each quantity at least once; all pairings, where these are few.
+    """Draws that have every value of each quantity at least once.
 
-    Two values that each go with the scenario's own may contradict each other.
+    They are all pairings where these are few. `values` lists what is tried of each quantity, by
+    name. Two values that each agree with the scenario may contradict each other, so they meet in
+    more than one order.
     """
     if math.prod(map(len, values.values())) <= MOST_ROUNDS:
         return [dict(zip(values, chosen, strict=True)) for chosen in product(*values.values())]
@@ -246,7 +265,7 @@ def _rounds(values: Mapping[str, list[Any]]) -> list[dict[str, Any]]:
 
 
 def _values_to_try(quantity: Quantity) -> list[Any]:
-    """Some of the values that a quantity has: all, where there are few."""
+    """Some values of a quantity: all of them where they are few; numbers of rows for a table."""
     if quantity.rows:
         return list(range(len(quantity.lines.rows)))
     if quantity.seed:
@@ -258,9 +277,9 @@ def _values_to_try(quantity: Quantity) -> list[Any]:
 def _wrong_values(
     name: str, quantity: Quantity, laws: Mapping[str, Scenario], own: Mapping[str, Any]
 ) -> Iterator[str]:
-    """What is wrong with the values that are tried of a quantity.
+    """What is wrong with the values that are tried of a quantity, a message for each law.
 
-    `own` is what the runs of a law have in common.
+    `own` has the structure of each law's loop before any draw.
     """
     rows = len(quantity.lines.rows) if quantity.rows else 0
     tried = _values_to_try(quantity)
@@ -268,6 +287,7 @@ def _wrong_values(
     for law, single in laws.items():
         answers = [_scenario_or_refusal(name, quantity, single, value) for value in tried]
         refusals = [answer if isinstance(answer, str) else "" for answer in answers]
+        # A few refused draws of a distribution are invalid runs of the study, which may be meant.
         if all(refusals) or (all_count and any(refusals)):
             place, refused = next((i, text) for i, text in enumerate(refusals) if text)
             row = f"row {place + 1} of {rows}: " if rows else ""
@@ -282,7 +302,10 @@ def _wrong_values(
 def _scenario_or_refusal(
     name: str, quantity: Quantity, scenario: Scenario, value: Any
 ) -> Scenario | str:
-    """The scenario with this draw, or the sentence that says why it cannot be."""
+    """The scenario with this draw, or the sentence that says why it cannot be.
+
+    `value` is the draw of the quantity called `name`.
+    """
     try:
         return draw_scenario(scenario, {name: quantity}, {name: value})
     except ValueRefused as error:
@@ -290,7 +313,7 @@ def _scenario_or_refusal(
 
 
 def _structure(scenario: Scenario) -> Any:
-    """What runs have in common that differ in numbers only."""
+    """The structure of a scenario's loop: equal for runs that differ in numbers only."""
     return Plan(scenario.closed_loop(), scenario.time_grid()).structure
 
 
@@ -299,6 +322,7 @@ def _twice(sweep: Sweep) -> Faults:
     keys = [(name, key) for name, q in sweep.vary.items() for key in q.targets(name)]
     counts, of_rows = Counter(key for _, key in keys), set[str]()
     for name, key in keys:
+        # A table of rows has many keys: one message is enough.
         if name in of_rows:
             continue
         others = [other for other, same in keys if same == key and other != name]
@@ -315,7 +339,10 @@ def _by(others: list[str]) -> str:
 
 
 def gathered_metrics(scenario: Scenario) -> dict[str, Metric]:
-    """The metrics that are gathered during a run; none of a target that is beside the vessel."""
+    """The metrics that are accumulated during a run, without any log.
+
+    Metrics of the target are left out where the path leads beside the vessel.
+    """
     return {
         name: metric
         for name, metric in scenario.known_metrics().items()
@@ -324,7 +351,7 @@ def gathered_metrics(scenario: Scenario) -> dict[str, Metric]:
 
 
 def _keep(scenario: Scenario, sweep: Sweep) -> Faults:
-    """Kept runs by a metric or a draw that there is not."""
+    """Kept runs by a metric or a draw that does not exist."""
     metrics = gathered_metrics(scenario)
     for name in sweep.keep.worst:
         if name not in metrics:
@@ -339,7 +366,7 @@ def _keep(scenario: Scenario, sweep: Sweep) -> Faults:
 
 
 def _claims(scenario: Scenario, sweep: Sweep) -> Faults:
-    """Claims and a condition of success that cannot be read, or not be judged in this design."""
+    """What is wrong with claims and success: unreadable, or not to be judged in this design."""
     if sweep.claims and not sweep.independent:
         remedy = f"`claims: {{{next(iter(sweep.claims))}: null}}`"
         yield (

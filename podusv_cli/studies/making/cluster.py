@@ -51,7 +51,11 @@ class UnitTask:
 def executor(
     scheduler: str, workers: int, study: StudyText, identity: str
 ) -> AbstractContextManager[Executor]:
-    """Where units are made: processes of this machine, or the workers of a scheduler, if any."""
+    """Where units are made: processes of this machine, or the workers of a scheduler.
+
+    `scheduler` is an address, "" for none; `workers` is how many processes (0: one a core).
+    `identity` digests the study's identity.
+    """
     if not scheduler:
         return nullcontext(Processes(workers))
     return connect_cluster(scheduler, study, identity)
@@ -59,10 +63,10 @@ def executor(
 
 @contextmanager
 def connect_cluster(address: str, study: StudyText, identity: str) -> Iterator[Cluster]:
-    """The cluster of a scheduler, its workers checked; `identity` is the digest of the study's.
+    """The cluster of a scheduler, its workers checked; `identity` digests the study's identity.
 
-    Raises UsageError without Dask and for a worker that does not fit, StorageError without a
-    scheduler.
+    Raises UsageError without Dask and for a worker that computes with something else, StorageError
+    where no scheduler answers.
     """
     with _client(address) as client:
         ours = remote.report(study.text, study.plugins) | {"the study": identity}
@@ -92,9 +96,9 @@ def _client(address: str) -> Iterator[Any]:
 
 @contextmanager
 def _silent_talkers() -> Iterator[None]:
-    """Dask logs nothing but what is critical; afterwards what it did before.
+    """Dask's loggers are silent but for critical records; afterwards they are as before.
 
-    A filter of its own, as a level that is put back would be that of another thread's cluster.
+    A filter is added, since a saved and restored level could be that of another thread's cluster.
     """
     loggers, critical = [*map(logging.getLogger, TALKERS)], _Critical()
     for logger in loggers:
@@ -118,10 +122,14 @@ class Cluster:
     def __init__(self, client: Any, study: StudyText, ours: Report) -> None:
         """Take a client of Dask, the study, and what every worker has to report."""
         self._client, self._study, self._ours = client, study, ours
+        # Threads by worker, and when they were last looked up: at once, with this value.
         self._threads, self._looked = dict[str, int](), -LOOK
         self._running, self._finished = dict[Any, UnitTask](), SimpleQueue[Any]()
+        # Units to hand out once more, and units whose worker died, which are tried alone.
         self._again, self._suspects = deque[UnitTask](), deque[UnitTask]()
+        # Units that killed a worker when alone, and why a worker gets no units, by worker.
         self._guilty, self._refused = list[UnitTask](), dict[str, str]()
+        # For provenance: machine and units of each worker.
         self._machines, self._made = dict[str, str](), dict[str, list[UnitTask]]()
 
     def check(self) -> None:
@@ -137,12 +145,18 @@ class Cluster:
             worker: self._client.submit(remote.report, text, plugins, workers=[worker], pure=False)
             for worker in sorted(self._threads)
         }
+        # All workers report at the same time, so they share one limit; the last one still gets 0.1
+        # s.
         end = time.monotonic() + REPORTING
         for worker, future in reports.items():
             self._check(worker, future, max(0.1, end - time.monotonic()))
 
     def _check(self, worker: str, future: Any, patience: float) -> None:
-        """Raises UsageError where a worker cannot load the study, or computes with other code."""
+        """Raise UsageError where a worker cannot load the study, or computes with other code.
+
+        `future` is the worker's report, which is awaited for `patience` [s]; a slow worker passes
+        here and is checked again before its first unit.
+        """
         try:
             report = future.result(timeout=patience)
         except TimeoutError:  # it is slow, or gone
@@ -157,7 +171,10 @@ class Cluster:
             raise UsageError(f"worker {worker} computes with something else: {wrong}")
 
     def __call__(self, units: Units, done: Done) -> bool:
-        """As `Executor` says. Raises StorageError where the scheduler is lost."""
+        """As `Executor` says. Raises StorageError where the scheduler is lost.
+
+        An interrupt is let through only while waiting, so that no outcome is taken in half.
+        """
         with interrupts_deferred():
             try:
                 while self._fill(units):
@@ -173,8 +190,9 @@ class Cluster:
         return True
 
     def _fill(self, units: Units) -> bool:
-        """Hand out units while workers have room; whether any is under way or waits."""
+        """Hand out units while workers have room; whether any unit is under way or waits."""
         self._look()
+        # None: every worker, also one that joins later.
         allowed = frozenset(self._threads) - frozenset(self._refused) if self._refused else None
         while allowed != frozenset() and self._has_room() and (task := self._next(units)):
             self._submit(replace(task, allowed=allowed))
@@ -185,7 +203,10 @@ class Cluster:
         return not alone and len(self._running) < max(1, WINDOW * sum(self._threads.values()))
 
     def _next(self, units: Units) -> UnitTask | None:
-        """The next unit to hand out, or None where nothing can be handed out now."""
+        """The next unit to hand out, or None where nothing can be handed out now.
+
+        First units that a worker gave back, then new ones; suspects go last, one at a time.
+        """
         if self._again:
             return self._again.popleft()
         if not self._suspects:
@@ -201,7 +222,10 @@ class Cluster:
         return None if self._running else self._suspects.popleft()
 
     def _is_guilty(self, task: UnitTask) -> bool:
-        """Whether it is part of a unit that killed its worker when nothing else was under way."""
+        """Whether the unit is part of one that killed its worker when nothing else was under way.
+
+        Halves of such a unit are tried alone from the start.
+        """
         unit, at = task.unit, (task.variant, task.unit.law, task.unit.cell)
         return any(
             at == (guilty.variant, guilty.unit.law, guilty.unit.cell)
@@ -211,6 +235,7 @@ class Cluster:
 
     def _submit(self, task: UnitTask) -> None:
         """Hand a unit to the cluster; its future is put into `_finished` when it is done."""
+        # Text and numbers alone, see `remote`.
         future = self._client.submit(
             remote.make_unit,
             self._study.text,
@@ -233,7 +258,10 @@ class Cluster:
         return future, self._reply(future) if future in self._running else None
 
     def _reply(self, future: Any) -> Reply:
-        """What a worker answered; a unit that killed its workers is a failure of that unit."""
+        """What a worker answered; an error becomes an outcome with a failure.
+
+        `future` is that of Dask, and is over. Raises StorageError where the scheduler is lost.
+        """
         if future.status == "error":
             error = future.exception()
             killed = type(error).__name__ == KILLED
@@ -247,7 +275,11 @@ class Cluster:
         return reply
 
     def _receive(self, task: UnitTask, reply: Reply, done: Done) -> None:
-        """Pass on an outcome, or plan the unit again where the worker is to blame."""
+        """Pass an outcome on to `done`, or plan the unit again.
+
+        It is planned again where the worker computes with something else, or died with other units
+        under way, so that nobody knows which unit killed it.
+        """
         if reply.outcome is None:
             self._refused[reply.worker] = (
                 f"worker {reply.worker} got no units, because it computes with something else: "
@@ -274,6 +306,7 @@ class Cluster:
         except LOST as error:
             raise lost_scheduler(error) from error
         self._threads = {name: worker["nthreads"] for name, worker in workers.items()}
+        # A future that is bound to workers that left would wait without end.
         for future, task in list(self._running.items()):
             if task.allowed is not None and task.allowed.isdisjoint(self._threads):
                 self._again.append(self._running.pop(future))
@@ -281,7 +314,7 @@ class Cluster:
 
     @property
     def workers(self) -> int:
-        """The threads of all workers that there are now."""
+        """How many threads all present workers have together."""
         return max(1, sum(self._threads.values()))
 
     def provenance(self) -> dict[str, Any]:
@@ -307,7 +340,7 @@ def lost_scheduler(error: BaseException) -> StorageError:
 
 
 def _join_units(units: Iterable[Unit]) -> Iterator[str]:
-    """Units in words, those that follow each other as one: `pid[0] draws 0 to 63`."""
+    """Units as text, with adjoining ones as one: `pid[0] draws 0 to 63` (0 is the cell)."""
     joined: list[Unit] = []
     for unit in sorted(units):
         last = joined[-1] if joined else None

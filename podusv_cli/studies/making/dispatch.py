@@ -54,7 +54,7 @@ class StudyTally:
         return cls(sum(map(len, there.values())), made, before=made)
 
     def note(self, unit: Unit, seconds: float) -> None:
-        """Enter the processor time of a unit."""
+        """Enter the processor time `seconds` [s] of a unit."""
         self.computed[unit.law] = self.computed.get(unit.law, 0.0) + seconds
         self.ran[unit.law] = self.ran.get(unit.law, 0) + unit.count
 
@@ -65,7 +65,10 @@ class StudyTally:
 
     @property
     def left(self) -> float:
-        """Seconds that are left at this rate; infinite while it is too early to tell."""
+        """The time until all runs are made at this rate [s].
+
+        It is infinite while it is too early to say.
+        """
         early = time.monotonic() - self.began < EARLY
         return math.inf if early or not self.rate else (self.wanted - self.made) / self.rate
 
@@ -124,7 +127,10 @@ class _Shares:
     """
 
     def __init__(self, units: Units, done: Done, workers: int) -> None:
-        """Deal `units` to so many workers, several units a job where they are short."""
+        """`units` are dealt to `workers` processes, several a job where they are short.
+
+        `done` is called for each.
+        """
         self._units, self._done, self._workers = units, done, workers
         self._parts = dict[int, list[tuple[int, StudyPlan, Unit]]]()
         self._again = deque[tuple[int, StudyPlan, Unit]]()
@@ -140,12 +146,16 @@ class _Shares:
         return number, partial(_timed_together, [(plan, unit) for _, plan, unit in parts])
 
     def _take_share(self) -> list[tuple[int, StudyPlan, Unit]]:
-        """The next units: a process's share of those that are known to wait."""
+        """The next units for one process: an equal share of those that wait, TOGETHER at most."""
+        # A driver that does not say how many units wait (length hint 0) gets one unit a job.
         first, waiting = next(self._units), length_hint(self._units)
         return [first, *islice(self._units, min(TOGETHER - 1, waiting // self._workers))]
 
     def take_outcome(self, number: int, outcome: Outcome) -> None:
-        """Tell the outcome of each unit."""
+        """Tell the outcome of each unit of the job `number`.
+
+        A killed job's units are made once more, singly.
+        """
         parts = self._parts.pop(number)
         if outcome.killed and len(parts) > 1:
             self._again.extend(parts)
@@ -158,7 +168,10 @@ class _Shares:
 def _timed_together(
     parts: Sequence[Part], progress: Callable[[float], None]
 ) -> list[tuple[UnitResult, float]]:
-    """Units, each with its share of the processor time; those that are alike as one batch."""
+    """The result of each unit with its processor time [s], in the order of `parts`.
+
+    Units that are `alike` march as one batch. Its time is divided in proportion to their draws.
+    """
     kinds = [alike(part) for part in parts] if len(parts) > 1 else [""]
     made: dict[int, tuple[UnitResult, float]] = {}
     for kind in dict.fromkeys(kinds):
@@ -176,13 +189,14 @@ class StudyDriver:
     def __init__(
         self, store: Store, plan: StudyPlan, tell: Tell, until: float, part: Shard
     ) -> None:
-        """Units of this part are handed out until the monotonic time `until` [s]."""
+        """Hand out the missing runs of one shard (`part`) until the monotonic time `until` [s]."""
         self.store, self.plan, self._tell, self._until = store, plan, tell, until
         there, inside = store.covered_draws(), np.zeros(self.plan.sweep.draws, bool)
         inside[shard(len(inside), *part)] = True
         self._gaps = {key: stretches(inside & np.logical_not(mask)) for key, mask in there.items()}
         self.tally = StudyTally.of({key: mask[inside] for key, mask in there.items()})
         self._units, self._numbers = dict[int, Unit](), count()
+        # Halves of units that ended their process; they come before anything else.
         self._halves: deque[Unit] = deque()
         self._seconds = 0.0  # of computing a run, so far the longest average of a unit
         self.failure: Outcome | None = None
@@ -192,7 +206,7 @@ class StudyDriver:
         return self
 
     def __next__(self) -> tuple[int, StudyPlan, Unit]:
-        """The next unit, with its number."""
+        """The next unit with a number of its own and the plan; StopIteration at the end."""
         unit = self._next()
         if unit is None:
             raise StopIteration
@@ -205,7 +219,10 @@ class StudyDriver:
         return {key: sum(map(len, ranges)) for key, ranges in self._gaps.items() if ranges}
 
     def _next(self) -> Unit | None:
-        """The next range of draws that is missing, or None when all are handed out."""
+        """The next range of missing draws of a law in a cell, or None when all are handed out.
+
+        None, too, after a failure and when the time is over; units under way still come back.
+        """
         if self._halves:
             return self._halves.popleft()
         if self.failure or time.monotonic() > self._until:
@@ -226,10 +243,14 @@ class StudyDriver:
         return min(MOST, max(FIRST, round(AIM / self._seconds))) if self._seconds else FIRST
 
     def take_outcome(self, number: int, outcome: Outcome) -> None:
-        """Keep the result of a unit; halve one that ended its process."""
+        """Keep the result of unit `number`; halve one that ended its process.
+
+        Halving goes on until the single run is found, which then counts as crashed.
+        """
         unit = self._units.pop(number)
         if outcome.result:
             result, seconds = outcome.result
+            # The slowest law sets the size of units, so that none takes much longer than AIM.
             self._seconds = max(self._seconds, seconds / unit.count)
             self.tally.note(unit, seconds)
             self._keep(result)
@@ -257,7 +278,7 @@ def time_unit(
 
 
 def shard(draws: int, number: int, count: int) -> slice:
-    """The draws of a shard."""
+    """The draws of shard `number` (from 1) of `count`, as a slice; sizes differ by one at most."""
     return slice((number - 1) * draws // count, number * draws // count)
 
 
@@ -271,12 +292,13 @@ def dispatch(
     part: Shard = (1, 1),
     begin: Callable[[Gaps, Mapping[str, str]], None] = lambda missing, alone: None,
 ) -> tuple[StudyTally, bool]:
-    """Simulate what is missing, for so many seconds at most; how far it is, and if it is whole.
+    """Simulate what is missing; how far it is, and whether all runs of this part are made.
 
-    `begin` is told before the first run what is missing, and which laws march one by one and why.
-
-    Every unit is on the disk before the next is handed out. Raises PodusvError where a unit cannot
-    be made at all or not be written, KeyboardInterrupt after an interrupt; what is made is kept.
+    `tell` is called after each unit. `seconds` limits the time in which units are handed out [s],
+    `part` is the shard. `begin` is told before the first run what is missing, and which laws march
+    one by one and why. Every unit is on the disk before its process gets another. Raises
+    PodusvError where a unit cannot be made or written, KeyboardInterrupt after an interrupt; what
+    is made is kept.
     """
     driver = StudyDriver(store, plan, tell, time.monotonic() + seconds, part)
     missing = driver.missing()

@@ -29,17 +29,20 @@ SWEEP = "sweep"  # the stream of a sweep's own draws
 
 
 def words(seed: int, quantity: str, first: int, count: int, stream: str = SWEEP) -> Words:
-    """The random words of draws first, first + 1, ... of a quantity."""
+    """Random 64-bit words (count,) of draws first, first + 1, ... of a quantity, by its name.
+
+    They depend on `seed`, `stream`, the name and the draw's number alone.
+    """
     return random_words.words((seed, stream, quantity), first, count)
 
 
 def uniforms(seed: int, quantity: str, first: int, count: int, stream: str = SWEEP) -> Vector:
-    """Draws of a quantity, uniform in (0, 1) without the ends."""
+    """Draws (count,) of a quantity from number `first` on, uniform in (0, 1) without the ends."""
     return in_unit_interval(words(seed, quantity, first, count, stream))
 
 
 def seeds(seed: int, quantity: str, first: int, count: int, stream: str = SWEEP) -> Words:
-    """Draws of a seed: whole numbers."""
+    """Draws (count,) of a seed from number `first` on: whole numbers below 2^53."""
     return words(seed, quantity, first, count, stream) >> np.uint64(64 - SEED_BITS)
 
 
@@ -47,6 +50,7 @@ def table(sweep: Sweep, first: int, count: int, stream: str = SWEEP) -> dict[str
     """Draws first, first + 1, ... of every quantity, by its name; each (count,)."""
     shares = _sobol if sweep.design == "sobol" else _random
     drawn_shares = shares(sweep, first, count, stream)
+    # A draw may overflow to infinity, which the scenario's ranges then refuse with a message.
     with np.errstate(over="ignore"):  # the scenario's ranges tell
         return {
             name: seeds(sweep.seed, name, first, count, stream)
@@ -63,12 +67,16 @@ def draws(sweep: Sweep, first: int, count: int, stream: str = SWEEP) -> Iterator
 
 
 def _random(sweep: Sweep, first: int, count: int, stream: str) -> dict[str, Vector]:
-    """Independent shares (count,) in [0, 1) by quantity."""
+    """Independent shares (count,) in (0, 1) by quantity."""
     return {name: uniforms(sweep.seed, name, first, count, stream) for name in sweep.vary}
 
 
 def _sobol(sweep: Sweep, first: int, count: int, stream: str) -> dict[str, Vector]:
-    """Sobol' points (count,) by quantity, each dimension shifted by the quantity's own digits."""
+    """Sobol' points (count,) in (0, 1) by quantity, from point number `first` on.
+
+    Each dimension is shifted by its own random digits. The shift is a digital one (XOR): it
+    randomizes the points and keeps how evenly they lie.
+    """
     from scipy.stats import qmc  # takes 60 MB
 
     if not sweep.vary:
@@ -77,9 +85,11 @@ def _sobol(sweep: Sweep, first: int, count: int, stream: str) -> dict[str, Vecto
     if first:  # scipy cannot go forward by nothing
         sequence.fast_forward(first)
     with catch_warnings(category=UserWarning, action="ignore"):  # of counts but powers of 2
+        # Back to whole numbers, exact in 32 bits, since the shift works on binary digits.
         points = (sequence.random(count) * 2.0**SOBOL_BITS).astype(np.uint64)
     shifts = [words(sweep.seed, name, 0, 1, f"{stream} shift") for name in sweep.vary]
     return {
+        # A point's digits move to the top of the word; the shift's further digits fill up the rest.
         name: in_unit_interval((points[:, i] << np.uint64(64 - SOBOL_BITS)) ^ shift)
         for i, (name, shift) in enumerate(zip(sweep.vary, shifts, strict=True))
     }
@@ -91,10 +101,11 @@ def draw_scenario(scenario: Scenario, vary: Mapping[str, Quantity], draw: Draw) 
 
 
 def drawing(scenario: Scenario, vary: Mapping[str, Quantity]) -> Callable[[Draw], Scenario]:
-    """What makes of a draw the scenario of one law with the numbers of the draw in it.
+    """A function from a draw to the scenario of one law with the numbers of the draw in it.
 
-    `vessel.m` does not change `nominal`, which the law is told. The function raises ValueRefused
-    where a number is out of range. It looks up places and the scenario's own values only once.
+    `vary` has the quantities that a draw has. `vessel.m` does not change `nominal`, which the law
+    knows. The function raises ValueRefused where a number is out of range. Places and the
+    scenario's own values are looked up only once here, not for each draw.
     """
     targets = [
         (steps, name, quantity, _own(scenario, quantity, steps), place)
@@ -121,5 +132,5 @@ def drawing(scenario: Scenario, vary: Mapping[str, Quantity]) -> Callable[[Draw]
 
 
 def _own(scenario: Scenario, quantity: Quantity, steps: Route) -> Any:
-    """What the scenario has at a key, where the quantity changes that."""
+    """What the scenario has at a key, needed only by quantities that add to it or scale it."""
     return content(scenario, steps) if quantity.relative else None

@@ -16,9 +16,10 @@ HELD_BYTES = 32  # of a run in memory while tables are made: four numbers
 
 
 def check_fits(plan: StudyPlan, folder: Path, parts: int = 1) -> None:
-    """Raise StorageError where the runs of one of so many parts surely do not fit.
+    """Raise StorageError where the runs surely fit neither the disk nor the memory.
 
-    They need their table on the disk, and a few numbers a run in memory.
+    The table of the runs is on the disk, divided into `parts` folders; a few numbers a run are in
+    memory.
     """
     shape = (len(plan.laws), len(plan.cells), plan.sweep.draws)
     runs, size = math.prod(shape), f"{math.prod(shape):,} runs (sweep.draws: {shape[2]:,})"

@@ -41,7 +41,7 @@ def check_draws(made: StudyPlan) -> Invalid:
 
 
 def invalid_runs(scenarios: Sequence[Scenario], sweep: Sweep, most: int = MOST_TRIED) -> Invalid:
-    """At most so many runs are tried; `scenarios` has one for each law and cell.
+    """Try draws in the scenarios of each law and cell, `most` runs at most; how many are refused.
 
     The draws come first: of 100 laws and cells, 2000 draws in one each say more of what is drawn
     than 20 draws in all. Which ones a draw meets is random, since every fourth point of a Sobol'

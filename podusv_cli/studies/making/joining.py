@@ -43,7 +43,7 @@ class SeenRuns:
         self._stores: list[Store] = []
 
     def add(self, store: Store) -> None:
-        """See all runs of a folder. Raises StorageError where one was seen with other numbers."""
+        """Note all runs of a folder. Raises StorageError where one was seen with other numbers."""
         self._stores.append(store)
         for new in store.results():
             place, rows = (new.unit.law, new.unit.cell), slice(new.unit.first, new.unit.draws.stop)
@@ -52,10 +52,14 @@ class SeenRuns:
             other = (origins != NOWHERE) & (known != new_digests)
             if other.any():
                 self._refuse(new, other, self._stores[origins[np.argmax(other)]])
+            # Views of rows: this writes into the tables of digests and origins.
             known[:], origins[:] = new_digests, len(self._stores) - 1
 
     def _refuse(self, new: UnitResult, other: Mask, earlier: Store) -> None:
-        """Raises StorageError: the draws in `other` (count,) have other numbers in `earlier`."""
+        """Raise StorageError: draws of the unit `new` have other numbers in `earlier`.
+
+        `other` is a mask (count,) over the unit's draws: those that differ.
+        """
         unit, folder = new.unit, self._stores[-1].folder
         first = unit.first + int(np.argmax(other))
         names = ", ".join(_differing(new, earlier, first))
@@ -69,9 +73,14 @@ class SeenRuns:
 
 
 def digests(result: UnitResult) -> Any:
-    """A digest of each run of a unit; NaN is one number, whatever its bits."""
+    """A digest of 64 bits for each run of a unit (count,).
+
+    It covers metrics by name, end time, status and cause, so that the order of metrics does not
+    matter.
+    """
     columns = [*(result.metrics[name] for name in sorted(result.metrics)), result.until]
     table = np.column_stack([*columns, result.status])
+    # NaN has many bit patterns; all count as the same number.
     table[np.isnan(table)] = np.nan
     run_digests = (
         hashlib.blake2b(row.tobytes() + cause.encode(), digest_size=SIZE).digest()
@@ -81,7 +90,10 @@ def digests(result: UnitResult) -> Any:
 
 
 def _differing(new: UnitResult, earlier: Store, draw: int) -> Iterator[str]:
-    """The names of what is different of one run."""
+    """What the same run (number `draw`) has with other values in `earlier`.
+
+    They are names of metrics, or status, until, cause.
+    """
     old = next(
         result
         for result in earlier.results()
@@ -95,7 +107,7 @@ def _differing(new: UnitResult, earlier: Store, draw: int) -> Iterator[str]:
 
 
 def _run(result: UnitResult, draw: int) -> dict[str, Any]:
-    """All numbers of one draw of a unit, by name."""
+    """Everything that is known of one draw of a unit, by name; `draw` counts in the study."""
     row = draw - result.unit.first
     arrays: dict[str, Any] = {**result.metrics, "status": result.status, "until": result.until}
     return {name: array[row] for name, array in arrays.items()} | {"cause": result.causes[row]}
@@ -113,8 +125,9 @@ def mixture(folder: Path) -> str:
 
 
 def _machines(folder: Path) -> list[str]:
-    # A session that was killed has no end, and does not know how many runs it made.
     """The machines that made a study's runs, each once, in the order of sessions."""
+    # A session without runs, such as one that only wrote a report, says nothing of the numbers.
+    # A session that was killed has no end, and does not know how many runs it made.
     made = (
         session for session in sessions(folder) if session["runs"] or session["finished"] is None
     )
@@ -128,7 +141,10 @@ def machines(folder: Path) -> str:
 
 
 def _machine(session: Mapping[str, Any]) -> str:
-    """Processor and versions of a session, which decide the bits of its runs."""
+    """Processor and versions that decide the bits of a session's runs, in words.
+
+    `session` is one of `sessions`.
+    """
     platform, packages = session["platform"], session["packages"]
     return (
         f"{platform['processor']} ({platform['libc']}, podusv {session['podusv']}, "
@@ -137,7 +153,7 @@ def _machine(session: Mapping[str, Any]) -> str:
 
 
 def gaps(store: Store) -> list[str]:
-    """Which draws are not there, a sentence for all laws and cells that lack the same ones."""
+    """Sentences on the draws that are missing; laws and cells that lack the same ones share one."""
     lacking: dict[str, list[str]] = {}
     covered = store.covered_draws()
     for (law, cell), there in covered.items():
@@ -157,7 +173,7 @@ def _few(words: Sequence[str]) -> str:
 
 
 def _ranges(mask: Mask, first: int = 0) -> str:
-    """`draw 9`, or `draws 3, 8 to 12`, where a mask is true."""
+    """`draw 9`, or `draws 3, 8 to 12`, where `mask` (n,) is true; its entry 0 is draw `first`."""
     ranges = [range(r.start + first, r.stop + first) for r in stretches(mask)]
     words = [f"{r.start} to {r[-1]}" if len(r) > 1 else str(r.start) for r in ranges]
     return f"draw{'s' if np.sum(mask) > 1 else ''} {_few(words)}"

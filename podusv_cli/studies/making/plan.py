@@ -85,6 +85,7 @@ class StudyPlan:
     def metrics(self) -> tuple[str, ...]:
         """The names of the metrics that a law of the study has during a run, in their order."""
         probes = [self.run_plan(law, cell.index).probe for law in self.laws for cell in self.cells]
+        # A summary of NaN has the names that a law's probe gives, without any run.
         blank = [probe.summary(np.full(probe.size, np.nan)) for probe in probes]
         names = {name for numbers in blank for name in numbers}
         return tuple(name for name in self.scenario.known_metrics() if name in names)
@@ -105,7 +106,11 @@ class StudyPlan:
 
     @cached_property
     def identity(self) -> dict[str, Any]:
-        """All that the numbers depend on, by dotted keys; two studies that agree can be joined."""
+        """All that the numbers depend on, by dotted keys; two studies that agree can be joined.
+
+        Each law in each cell has its settings and a digest of its kernels. How many draws there are
+        is left out: a study may grow.
+        """
         sweep = self.sweep
         facts: dict[str, Any] = {"sweep.seed": sweep.seed, "sweep.design": sweep.design}
         if self.stream != SWEEP:
@@ -125,10 +130,14 @@ class StudyPlan:
         return facts
 
     def with_variant(self, variant: Variant) -> StudyPlan:
-        """The variant of this study, which has no grid. Raises ValidationError."""
+        """The study with the laws of `variant`, on its draws; this one must have no grid.
+
+        Raises ValidationError where a law refuses its numbers.
+        """
         own = self.scenario.singles()
         laws = {name: change_law(own[law].controller, dict(new)) for name, law, new in variant.laws}
         plain = {"laws": (), "draws": variant.draws, "claims": {}, "keep": Keep()}
+        # `controller` is a placeholder that the scenario needs; `controllers` has the laws.
         scenario = self.scenario.model_copy(
             update={
                 "controllers": laws,
@@ -152,7 +161,10 @@ def plan(loaded: Loaded) -> StudyPlan:
 
 
 def kernels(planned: Plan) -> str:
-    """A digest of the source of all kernels of a law's loop, the same on every processor."""
+    """A digest (16 hexadecimal digits) of the source of all kernels of a law's loop.
+
+    It is one of source, not of machine code: so it is the same on every processor.
+    """
     parts = [kernel for _, kernel, _ in planned.functions]
     sha = hashlib.sha256()
     for kernel in (closed_loop.advance, *parts):
@@ -162,7 +174,7 @@ def kernels(planned: Plan) -> str:
 
 
 def digest(identity: Mapping[str, Any]) -> str:
-    """A short digest of an identity."""
+    """A digest (16 hexadecimal digits) of an identity; the order of its keys does not matter."""
     text = json.dumps(identity, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -175,7 +187,10 @@ def differing(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
 def disagreements(
     one: Mapping[str, Any], other: Mapping[str, Any], keys: Sequence[str] | None = None
 ) -> str:
-    """The first of these keys, or of those that two identities differ in, with both values."""
+    """What two identities differ in, as text with both values, MOST_NAMED keys at most.
+
+    `keys` restricts it to these keys; "" where nothing differs.
+    """
     keys = differing(one, other) if keys is None else keys
     texts = [
         f"{key}: {one.get(key, 'not there')}, not {other.get(key, 'not there')}"

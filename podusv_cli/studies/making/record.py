@@ -39,7 +39,11 @@ def of_scenario(
     metrics: dict[str, MetricAbout],
     measured: tuple[str, ...],
 ) -> StudyAbout:
-    """What the study of a scenario says about itself, with what follows from its cells and laws."""
+    """What the study of a scenario says about itself.
+
+    `cells` are labels, `metrics` all that are known, `measured` the names of those that its runs
+    have.
+    """
     sweep, seas = scenario.sweep or Sweep(), scenario.disturbances().values()
     return StudyAbout(
         name=scenario.name,
@@ -75,11 +79,12 @@ def of_scenario(
 
 
 def drawing(study: StudyIdentity) -> tuple[Sweep, str]:
-    """How the quantities of a study are drawn, and the stream of its draws."""
+    """The settings of a study's draws, from its identity alone, and the stream of its draws."""
     head = "sweep.vary."
     own = study.identity
     vary = {key.removeprefix(head): value for key, value in own.items() if key.startswith(head)}
     settings = {"seed": own["sweep.seed"], "design": own["sweep.design"], "vary": vary}
+    # By way of JSON, as read from a file: lists then become tuples again.
     sweep = Sweep.model_validate_json(json.dumps({**settings, "draws": study.draws}))
     return sweep, own.get("stream", SWEEP)
 

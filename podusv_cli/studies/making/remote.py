@@ -44,6 +44,7 @@ def _place_plan(recipe: StudyText) -> tuple[StudyPlan, TemporaryDirectory[str]]:
     for name, text in recipe.plugins:
         place = Path(folder.name, name)
         place.parent.mkdir(exist_ok=True)
+        # Plug-ins are files to the scenario, so they are written as files here as well.
         place.write_text(text, encoding="utf-8")
     source = str(Path(folder.name, "scenario.yaml"))
     return plan(load_text(recipe.text, source, plugged=of_files(trusted=True))), folder
@@ -61,7 +62,7 @@ def _variant(recipe: StudyText, variant: tuple[Any, ...]) -> StudyPlan:
 
 @lru_cache(PLANS)
 def _report(recipe: StudyText) -> Report:
-    """Digests of all that this worker computes with, by what they are digests of."""
+    """All that this worker computes with: versions, and digests of kernels and of the study."""
     made = _plan(recipe)
     facts = {"podusv": podusv_cli.__version__, "Python": platform.python_version()}
     facts |= {name: version(name) for name in PACKAGES}
@@ -78,7 +79,7 @@ def report(text: str, plugins: Plugins) -> Report:
 
 
 def differing(ours: Report, theirs: Report) -> str:
-    """What is different in a worker's report, and a remedy; "" where nothing is."""
+    """What differs in a worker's report (`theirs`) from ours, with a remedy, or ""."""
     differences = [
         f"{name} is {theirs.get(name, 'not there')}, not {word}"
         for name, word in ours.items()
@@ -108,7 +109,12 @@ def make_unit(
     expected: str,
     variant: tuple[Any, ...] | None = None,
 ) -> Reply:
-    """Make a unit (law, cell, first draw, number of draws) of a study or a variant, on a worker."""
+    """Make one unit (law, cell, first draw, number of draws) on a worker of the cluster.
+
+    `text` and `plugins` are the study, `variant` the fields of a `Variant`, if any: plain data
+    alone, since objects of another podusv could not be read. No unit is made where the digest of
+    the worker's report is not `expected`.
+    """
     from distributed import get_worker
 
     facts, outcome, recipe = report(text, plugins), None, StudyText(text, plugins)

@@ -40,8 +40,10 @@ def write(
 ) -> None:
     """Write the table of a study with the `results`, in place of an older one.
 
-    `causes` are why runs did not finish. Raises StorageError; the older table is then still there.
+    `identity` digests the study's identity. `causes` say why runs did not finish, by (law, cell,
+    draw). Raises StorageError; the older table is then still there.
     """
+    # Beside the old table, so that replacing it is one step of the file system.
     part = path.with_name(temporary_name())
     try:
         places = _lay_out(part, study, identity, dict(sorted(causes.items())))
@@ -76,13 +78,18 @@ class Extent:
 
 
 def _lay_out(part: Path, study: StudyAbout, identity: str, causes: Causes) -> dict[str, Extent]:
-    """Make the file with everything but long arrays; the places of these."""
+    """Make the file `part` with everything but long arrays; where each of these lies, by name.
+
+    HDF5 only describes the long arrays. Their bytes are written later, without HDF5, block by
+    block.
+    """
     layout, places, wanted = LogLayout(), dict[str, Extent](), study.draws
     (sweep, stream), shape = record.drawing(study), (len(study.laws), len(study.cells), wanted)
     with h5py.File(layout, "w", **FILE, **UNDATED) as file:
         describe(file, {"title": study.name, "identity": identity, "status": " ".join(STATUSES)})
         scales = [_labels(file, "law", study.laws), _labels(file, "cell", study.cells)]
         scales.append(_labels(file, "draw", np.arange(wanted, dtype=np.int32)))
+        # One draw shows whether a quantity is a number; words have no fixed length in the file.
         for name, first in table(sweep, 0, 1, stream).items():
             if first.dtype.kind in NUMBERS:
                 path = f"{DRAWN}/{name}"
@@ -100,6 +107,7 @@ def _lay_out(part: Path, study: StudyAbout, identity: str, causes: Causes) -> di
             own = study.metrics[name]
             describe(file[name], {"units": own.unit, "long_name": own.meaning})
         for seal in (SEAL, SEAL_OF_THE_REST):
+            # A seal is a SHA-256 in 64 hexadecimal digits.
             places[seal] = _extent(file, seal, np.uint8, (64,), ())
     with new_file(part, layout.size) as out:
         layout.write_to(out)
@@ -108,7 +116,10 @@ def _lay_out(part: Path, study: StudyAbout, identity: str, causes: Causes) -> di
 
 
 def bytes_of(shape: tuple[int, int, int], metrics: int, drawn: int) -> int:
-    """Roughly the size of a table of so many laws, cells and draws."""
+    """Roughly the size of the table [bytes] for `shape` (laws, cells, draws).
+
+    `metrics` and `drawn` are the numbers of metrics and of drawn quantities.
+    """
     of_a_run = 8 * (metrics + 1) + 1  # with `until` and `status`
     return int(np.prod(shape)) * of_a_run + shape[2] * (4 + 8 * drawn) + HEAD * (metrics + 2)
 
@@ -116,8 +127,13 @@ def bytes_of(shape: tuple[int, int, int], metrics: int, drawn: int) -> int:
 def _extent(
     file: h5py.File, name: str, kind: Any, shape: tuple[int, ...], scales: Sequence[h5py.Dataset]
 ) -> Extent:
-    """An array whose numbers podusv writes."""
+    """Describe an array in `file` whose bytes podusv writes itself; returns where they lie.
+
+    `kind` is the type of its numbers, `scales` are the labels of its axes. Space is allotted at
+    once (EARLY) and not filled (NEVER), so that its place in the file is known now.
+    """
     made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    # The same results make the same bytes, whenever they are written.
     made.set_obj_track_times(False)
     made.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     made.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
@@ -152,7 +168,9 @@ def _column(drawn: Any) -> Any:
 def _fill(
     part: Path, study: StudyAbout, places: dict[str, Extent], results: Iterable[UnitResult]
 ) -> None:
-    """Write the long arrays, piece by piece. (An array in memory that is the file would take as
+    """Write the long arrays into `part`, piece by piece, and the two digests last.
+
+    `places` has where each lies and is used up. (An array in memory that is the file would take as
     much memory, and a full disk would end the process.)
     """
     seal, rest = places.pop(SEAL), places.pop(SEAL_OF_THE_REST)
@@ -168,6 +186,7 @@ def _fill(
             _blank(out, extent, NOT_MADE if name == "status" else np.nan)
         for result in results:
             unit = result.unit
+            # Its place would be in the next law's rows.
             if unit.draws.stop > wanted:
                 raise StorageError(
                     f"cannot write runs.h5 of {wanted} draws: there are runs of "
@@ -186,7 +205,7 @@ def _fill(
 
 
 def _blank(out: Any, extent: Extent, content: float) -> None:
-    """Fill the room of a dataset with one number, block by block."""
+    """Fill the room of an array with one number, block by block: runs that are not made stay so."""
     for start in range(extent.offset, extent.end, BLOCK):
         count = (min(BLOCK, extent.end - start)) // extent.kind.itemsize
         write_at(out, start, extent.content(np.full(count, content)))

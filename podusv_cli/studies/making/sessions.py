@@ -51,6 +51,7 @@ def _note_session(session: dict[str, Any]) -> dict[str, Any]:
 
 
 class _Provenance(BaseModel):
+    # The files call sessions sittings; files of earlier studies have this key.
     sittings: list[Annotated[dict[str, Any], AfterValidator(_note_session)]]
 
 
@@ -61,7 +62,10 @@ def sessions(folder: Path) -> list[dict[str, Any]]:
 
 
 def timing(folder: Path) -> dict[str, Any]:
-    """How long the runs of each law took, over all sessions. Raises StorageError."""
+    """How long the runs of each law took, over all sessions: the content of timing.json.
+
+    By law: number of timed runs, processor time [s], and milliseconds a run. Raises StorageError.
+    """
     every = sessions(folder)
     runs, seconds = Counter[str](), Counter[str]()
     for session in every:
@@ -75,6 +79,7 @@ def timing(folder: Path) -> dict[str, Any]:
     return {
         "format": 1,
         "laws": laws,
+        # The file's word for sessions, as in provenance.json.
         "sittings": [{k: session[k] for k in keys} for session in every],
     }
 
@@ -103,6 +108,7 @@ class SessionLog:
         self._origin = begun | {"finished": None, "duration_s": None, "runs": 0}
         with files.storage_errors(f"cannot remove {folder / manifest.NAME}"):
             (folder / manifest.NAME).unlink(missing_ok=True)
+        # Several shards may begin at once in one folder; each needs a place of its own.
         with sole_writer(folder, PROVENANCE, PATIENCE):
             earlier = sessions(folder)
             for other in others:
@@ -111,14 +117,17 @@ class SessionLog:
             self._write(earlier)
 
     def end(self, runs: int, facts: Mapping[str, Any] = MappingProxyType({})) -> None:
-        """Note how many runs it made, and what else is told of it. Raises StorageError."""
+        """Note that `runs` runs were made, and further `facts` of the session.
+
+        Raises StorageError.
+        """
         times = provenance.times(self._started, datetime.now(UTC))
         self._origin |= {**times, "runs": runs, **facts}
         with sole_writer(self._folder, PROVENANCE, PATIENCE):
             self._write(sessions(self._folder))
 
     def _write(self, noted: list[dict[str, Any]]) -> None:
-        """Write the sessions anew, this one at its place among them."""
+        """Write the sessions anew, with this one at its place; `noted` are those in the file."""
         noted[self._place : self._place + 1] = [self._origin]
         content = {"format": 1, "sittings": noted}
         files.write_bytes(self._folder / NAME, json_text.encode(content))

@@ -54,9 +54,9 @@ class Store:
     def open(self, started: str, texts: Mapping[str, str] = MappingProxyType({})) -> None:
         """Make the folder, or check that it holds this very study, and note what is asked for.
 
-        `texts` has the scenario and its plug-ins by the names of their files, where they are to be
-        written. Raises UsageError where it holds another study, naming what is different, and
-        StorageError.
+        `started` is the time of this call in ISO 8601. `texts` has the scenario and its plug-ins by
+        the names of their files, where they are to be written. Raises UsageError where it holds
+        another study, naming what is different, and StorageError.
         """
         history: tuple[SweepCall, ...] = ()
         known = (self.folder / STUDY).exists()
@@ -100,7 +100,10 @@ class Store:
         identity: Mapping[str, Any],
         remedy: str = "name another folder with --out, or begin anew with --force",
     ) -> None:
-        """Raises StorageError where a study of this identity cannot go on in this folder."""
+        """Raise UsageError where `identity` is not this study's.
+
+        The message names `folder` and the `remedy`.
+        """
         if different := disagreements(identity, self.about.identity):
             raise UsageError(f"{folder} holds another study: {different}; {remedy}")
 
@@ -122,9 +125,10 @@ class Store:
         return sorted((self.folder / UNITS).glob("*.unit"))
 
     def write_runs(self) -> runs_file.RunsTable:
-        """Put every run into runs.h5, and remove its units once no run is missing; the runs.
+        """Put every run into runs.h5, and return its table.
 
-        A driver may make more units meanwhile, which are left alone. Raises StorageError.
+        The files of units are removed once no run is missing. Another process may add units
+        meanwhile, which are left alone. Raises StorageError.
         """
         earlier, units, causes = [*self._earlier()], list[Path](), dict[RunKey, str]()
         for path in self._units():
@@ -132,6 +136,7 @@ class Store:
                 units.append(path)
                 causes |= self._causes(result)
         for table in earlier:
+            # Nothing is new: the table is as it would be written.
             if not units and table.wanted == self.about.draws:
                 return table
             causes |= table.causes
@@ -145,7 +150,7 @@ class Store:
         return runs
 
     def _causes(self, result: UnitResult) -> dict[RunKey, str]:
-        """Why runs of a unit did not finish."""
+        """Why runs of a unit did not finish, by (law, cell, draw); finished runs are left out."""
         unit, law = result.unit, self.about.laws.index(result.unit.law)
         causes = zip(unit.draws, result.causes, strict=True)
         return {(law, unit.cell, draw): cause for draw, cause in causes if cause}
@@ -153,7 +158,11 @@ class Store:
     def _these(
         self, earlier: Sequence[runs_file.RunsTable], units: Sequence[Path]
     ) -> Iterator[UnitResult]:
-        """What runs.h5 has already, and these units. Raises StorageError for other metrics."""
+        """The results in `earlier` tables and in `units`, each with all metrics of the study.
+
+        `units` are files of results. Raises StorageError where a unit has metrics that study.json
+        does not know.
+        """
         there = (result for table in earlier for result in table.results())
         for result in chain(there, filter(None, (read(path, self.seal) for path in units))):
             self._check_metrics(set(result.metrics) <= set(self.about.measured))
@@ -162,7 +171,7 @@ class Store:
             yield replace(result, metrics=metrics)
 
     def runs(self) -> runs_file.RunsTable:
-        """The runs of a study that has runs.h5. Raises StorageError, also for altered numbers."""
+        """The table of runs.h5, checked against its digests. Raises StorageError, with a remedy."""
         path = self.folder / RUNS
         try:
             table = runs_file.RunsTable(path, self.about.success, self.about.metrics)
@@ -211,8 +220,8 @@ class Store:
 def encode_unit(result: UnitResult, seal: str) -> bytes:
     """A unit as the content of a file; `seal` is the digest of the study's identity.
 
-    A line of JSON, then the metrics and end times as little-endian floats, then the states as
-    bytes.
+    A line of JSON, then the metrics and end times as little-endian floats of 64 bits, one row
+    (draws,) each, then the statuses as bytes.
     """
     facts = {
         "identity": seal,
@@ -232,11 +241,13 @@ def _head(facts: Mapping[str, Any], numbers: bytes) -> bytes:
 
 
 def decode_unit(content: bytes, seal: str) -> UnitResult | None:
-    """The unit of a file; None where it is damaged or of another identity."""
+    """The unit of a file's `content`; None where it is damaged or of another identity (`seal`)."""
     end = content.find(b"\n") + 1
     try:
         facts = json.loads(content[:end])
         del facts[SEAL]
+        # The head is made anew and compared, which checks the digest and the order of its keys at
+        # once.
         if content[:end] != _head(facts, content[end:]) or facts["identity"] != seal:
             return None
         names, unit = facts["metrics"], Unit(*facts["unit"])

@@ -27,12 +27,12 @@ def prepare(
     runs: int = 0,
     compiling: Callable[[float], None] | None = None,
 ) -> str:
-    """Check a law, and have its march compiled and loaded; why its runs march one by one.
+    """Check a law, have its march compiled and loaded, and say why its runs march one by one.
 
-    The reason is empty where runs march side by side. Raises LawError.
-
-    `runs` is how many runs of it there will be, by default those of the plan. `compiling` is called
-    with the fraction that is compiled, if there is anything to compile.
+    The reason is empty where runs march side by side. `runs` is how many runs of the law there will
+    be, by default those of the plan: for few, the march side by side is not worth compiling.
+    `compiling` is called with the fraction that is compiled, if there is anything to compile.
+    Raises LawError.
     """
     planned = plan.run_plan(law, cell)
     ready(planned, compiled=True, compiling=compiling)
@@ -46,9 +46,9 @@ def make(
     progress: Callable[[float], None] | None = None,
     grid: TimeGrid | None = None,
 ) -> UnitResult:
-    """Simulate a unit, run after run, over the scenario's instants or those of another grid.
+    """Simulate a unit, run after run, over the scenario's instants or those of another `grid`.
 
-    Raises KeyboardInterrupt, and then nothing is kept.
+    `progress` is called with the fraction done. Raises KeyboardInterrupt, and then nothing is kept.
     """
     return make_together([(plan, unit)], progress, grid)[0]
 
@@ -58,7 +58,7 @@ def make_together(
     progress: Callable[[float], None] | None = None,
     grid: TimeGrid | None = None,
 ) -> list[UnitResult]:
-    """Simulate units that are `alike`, as one batch; otherwise as `make`.
+    """Simulate units that are `alike`, as one batch; a result for each; otherwise as `make`.
 
     A unit with runs that the batch refuses is made once more by itself, as a number such as
     `hold_below` may change the structure of a law.
@@ -84,6 +84,7 @@ def make_together(
             unit,
             probe.summaries(done.seen[own]),
             np.array([STATUSES.index(word) for word in done.status[own]], np.uint8),
+            # The time of the last instant reached; a run that reached none has 0.
             np.maximum(done.reached[own] - 1, 0) * grid.step,
             tuple(map(str, done.cause[own])),
         )
@@ -99,7 +100,7 @@ def make_together(
 
 
 def _loops(plan: StudyPlan, unit: Unit) -> list[Callable[[], ClosedLoop]]:
-    """What makes the loop of each of a unit's draws."""
+    """A function for each of a unit's draws that builds its closed loop when called."""
     drawn = drawing(plan.single(unit.law, unit.cell), plan.sweep.vary)
 
     def loop(draw: Draw) -> ClosedLoop:
@@ -110,14 +111,21 @@ def _loops(plan: StudyPlan, unit: Unit) -> list[Callable[[], ClosedLoop]]:
 
 
 def alike(part: Part) -> str:
-    """What units have in common whose loops differ in numbers, and hardly ever in structure."""
+    """A key that is equal for units whose loops differ in numbers, and hardly ever in structure.
+
+    `part` is a plan and a unit of it. The key has the law, the cell and all settings of the law
+    that are no real numbers.
+    """
     plan, unit = part
     law = plan.single(unit.law, unit.cell).controller.model_dump()
     return repr((unit.law, unit.cell, {k: v for k, v in law.items() if not isinstance(v, float)}))
 
 
 def crashed_unit(unit: Unit, names: tuple[str, ...], cause: str) -> UnitResult:
-    """The result of a unit of one run that ends its process."""
+    """The result of a unit that ends its process: no numbers, all runs crashed for this `cause`.
+
+    `names` are the metrics that the table wants.
+    """
     nothing = np.full(unit.count, np.nan)
     return UnitResult(
         unit,

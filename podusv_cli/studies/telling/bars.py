@@ -47,7 +47,10 @@ def bars(claim: ParsedStudyClaim, verdict: StudyVerdict) -> Iterator[Bar]:
 
 
 def _bar(link: Link, part: Statistic) -> Bar:
-    """One number of a claim as a bar: places along it are in percent of its axis."""
+    """The bar of one statistic beside the bound of its comparison.
+
+    Its places are in percent of the axis.
+    """
     shares = isinstance(link.call.func, ast.Name) and link.call.func.id in (SHARE, FAILURES)
     first, last = _axis(link, part, shares=shares)
 
@@ -64,9 +67,13 @@ def _bar(link: Link, part: Statistic) -> Bar:
 
 
 def _axis(link: Link, part: Statistic, *, shares: bool) -> tuple[float, float]:
-    """The ends of an axis that has bound and interval on it."""
+    """The ends of an axis with bound and interval on it, and some room; shares end at 0 and 1.
+
+    `link` has the bound, `part` is the statistic with its interval.
+    """
     ends = [n for n in (part.low, part.high, part.estimate, link.bound) if math.isfinite(n)]
     low, high = min(ends), max(ends)
+    # Where all of them are one number, a tenth of it, or 1 around zero.
     room = MARGIN * (high - low) or 0.1 * abs(high) or 1.0
     low, high = low - room, high + room
     return (max(low, 0.0), min(high, 1.0)) if shares else (low, high)

@@ -45,7 +45,7 @@ UNKNOWN = "#BBBBBB"
 
 
 def sketches(results: Results, tracks: Mapping[str, Sequence[Track]]) -> Iterator[Sketch]:
-    """The figures that the study has numbers for."""
+    """The figures that the study has numbers for; `tracks` are those of kept runs, by law."""
     cells = range(min(len(results.runs.cells), MOST_CELLS))
     for name in results.shown_metrics:
         for cell in cells:
@@ -74,7 +74,10 @@ def _label(results: Results, name: str) -> str:
 
 
 def _metric_by_law(results: Results, name: str, cell: int) -> dict[str, Vector]:
-    """A metric of the draws that every law that has it was tried on, failures as infinity."""
+    """A metric (draws,) by law in one cell, infinite for failures; without laws that lack it.
+
+    The draws are those that every law was tried on.
+    """
     runs, about = results.runs, results.known_metrics[name]
     return {
         law: values[runs.done(law)[cell]]
@@ -88,7 +91,7 @@ def _bands(level: float) -> str:
 
 
 def _distribution(results: Results, name: str, cell: int) -> Iterator[Sketch]:
-    """The curves of one metric in one cell, a law each."""
+    """The figure of one metric in one cell, a curve for each law; none without numbers."""
     values, level = _metric_by_law(results, name, cell), results.level
     if values:
         yield Sketch(
@@ -101,7 +104,7 @@ def _distribution(results: Results, name: str, cell: int) -> Iterator[Sketch]:
 
 
 def _ratios(results: Results, name: str) -> Iterator[Sketch]:
-    """The ratios of one metric between two laws in the same draw."""
+    """The figure of one metric's ratios between two laws in the same draw; none without pairs."""
     pairs, cells, level = results.pairs, results.runs.cells[:MOST_CELLS], results.level
     if len(pairs) and len(rows := pairs[(pairs.metric == name) & pairs.cell.isin(cells)]):
         yield Sketch(
@@ -128,9 +131,9 @@ def _failures(results: Results, cell: int) -> Iterator[Sketch]:
 
 
 def _thresholds(results: Results, cell: int) -> Iterator[tuple[str, float, dict[str, Vector]]]:
-    """Metrics that success limits from above, the limits, and values of each law's draws.
+    """Each metric that success limits from above, its limit, and the draws' values (n,) by law.
 
-    A run that fails for another reason has infinity.
+    A run that fails for another reason has infinity. Other parts of the condition give no figure.
     """
     tree = parse_success(results.about.success, results.known_metrics)
     parts = tree.values if isinstance(tree, ast.BoolOp) else [tree]
@@ -148,7 +151,10 @@ def _thresholds(results: Results, cell: int) -> Iterator[tuple[str, float, dict[
 def _limit_axis(
     results: Results, name: str, others: Sequence[ast.expr], cell: int
 ) -> dict[str, Vector]:
-    """For each law the metric `name` of its runs (n,) in one cell; inf where `others` fail."""
+    """For each law the metric `name` of its runs (n,) in one cell; inf where `others` fail.
+
+    `others` are the remaining parts of the condition of success.
+    """
     runs, limited = results.runs, dict[str, Vector]()
     rest = ast.BoolOp(ast.And(), [ast.Name(FINISHED), *others])
     for law in runs.laws:
@@ -180,20 +186,23 @@ def _heatmaps(results: Results) -> Iterator[Sketch]:
 
 
 def _panel(results: Results, law: str, name: str, across: int) -> Vector:
-    """A number of every cell, a row for each combination of all keys but the first.
+    """The share of failures or the median of metric `name` in every cell, for one law.
 
-    Shape (cells / across, across), where `across` is how many values the first key has.
+    Shape (cells / across, across), where `across` is how many values the first key has. A row is a
+    combination of all other keys.
     """
     table = results.summary
     column = "failed" if name == "failed" else "q50"
     rows = table[(table.law == law) & ((name == "failed") | (table.metric == name))]
     by_cell = rows.drop_duplicates("cell").set_index("cell")[column]
     cells = np.array([by_cell.get(label, np.nan) for label in results.runs.cells], float)
+    # Cells are ordered with the last key changing fastest, so the first key varies down the
+    # reshaped array.
     return cells.reshape(across, -1).T
 
 
 def _correlations(results: Results, name: str, cell: int) -> Iterator[Sketch]:
-    """What one metric depends on in one cell, if it depends on anything."""
+    """The figure of what one metric depends on in one cell; none where nothing varies."""
     table = results.sensitivity
     if not len(table):
         return
@@ -222,7 +231,10 @@ def _funnel(tracks: Mapping[str, Sequence[Track]]) -> Iterator[Sketch]:
 
 
 def distributions(values: Mapping[str, Vector], label: str, level: float) -> Figure:
-    """The empirical distribution of a metric for every law; failures (+inf) are missing mass."""
+    """The empirical distribution of a metric for every law; failures (+inf) are missing mass.
+
+    `values` are (draws,) by law, `label` is the axis label, `level` the confidence of the bands.
+    """
     figure = new_figure(COLUMNS, 2.6)
     axes = figure.add_subplot()
     ends = _span(axes, values)
@@ -240,7 +252,11 @@ def distributions(values: Mapping[str, Vector], label: str, level: float) -> Fig
 def failure_rates(
     values: Mapping[str, Vector], label: str, threshold: float, level: float
 ) -> Figure:
-    """The share of draws that fail, were the metric's threshold another one; failures are +inf."""
+    """The share of draws that fail as a function of the metric's threshold, a curve a law.
+
+    `values` are (draws,) by law, +inf for runs that fail whatever the threshold; `label` names the
+    metric; a line marks the study's own `threshold`; `level` is the confidence of the bands.
+    """
     figure = new_figure(COLUMNS, 2.6)
     axes = figure.add_subplot()
     ends = _span(axes, values, threshold)
@@ -249,6 +265,7 @@ def failure_rates(
         _share_curve(axes, place, _legend_of(law, numbers), x, n - _at_most(numbers, x), n, level)
     axes.axvline(threshold, **TARGET_LOOK)
     axes.set_yscale("log")
+    # Half a draw, in percent: the smallest share above 0 is that of one draw.
     axes.set_ylim(50.0 / max(map(len, values.values())), 110.0)
     axes.set(xlabel=f"threshold of {label}", ylabel="failed draws [%]")
     axes.yaxis.set_major_formatter("{x:g}")
@@ -272,6 +289,7 @@ def ratios(pairs: pd.DataFrame) -> Figure:
         )
         if ends[0] <= pair.ratio <= ends[1]:
             axes.plot(pair.ratio, row, color=nth_style(0)[0], marker="o", markersize=3.6)
+        # An end beyond the axis becomes an arrowhead at its edge.
         for end in {low: pair.ratio_low, high: pair.ratio_high}.items():
             if end[0] != end[1]:  # beyond the axis
                 mark = "<" if end[0] == ends[0] else ">"
@@ -293,7 +311,8 @@ def heatmaps(
 ) -> Figure:
     """A number of every cell for each law: columns are the values of x, rows those of y.
 
-    `x` and `y` are grid keys with their values; NaN is a cell without one, inf a failure.
+    `panels` are (rows, columns) by law, NaN for a cell without a number, inf for a failure. `x` and
+    `y` are grid keys with their values; `label` is that of the colour scale.
     """
     height = FRAME + 2.0 * ROW * len(y[1])
     figure = new_figure(COLUMNS, height)
@@ -329,6 +348,7 @@ def correlations(sensitivity: pd.DataFrame) -> Figure:
     axes = figure.add_subplot()
     chance = float(sensitivity.by_chance.max())
     for place, law in enumerate(table.columns):
+        # The bars of all laws share 0.8 of a row, centred on it.
         at = np.arange(len(table)) + (place - (count - 1) / 2) * 0.8 / count
         axes.barh(
             at,
@@ -359,7 +379,7 @@ def funnel(curves: Mapping[str, Sequence[Track]]) -> Figure:
     for place, (law, runs) in enumerate(curves.items()):
         color, linestyle, _ = nth_style(place)
         for number, (time, distance) in enumerate(runs):
-            label = escaping.figure(law) if not number else "_"
+            label = escaping.figure(law) if not number else "_"  # "_" is not in the legend
             shown = np.maximum(distance, LEAST_DISTANCE)
             axes.plot(time, shown, color=color, linestyle=linestyle, linewidth=0.8, label=label)
     axes.set_yscale("log")
@@ -373,7 +393,11 @@ def funnel(curves: Mapping[str, Sequence[Track]]) -> Figure:
 
 
 def _span_of(distances: Sequence[Vector]) -> tuple[float, float]:
-    """Ends of a logarithmic axis of distances: what most runs have, a run that is lost aside."""
+    """The ends of a logarithmic axis [m] that shows most runs.
+
+    `distances` are (n,) [m], one array a run. Runs that peak beyond WIDE times the median peak, as
+    a lost vessel does, may leave it.
+    """
     peaks = np.array([float(np.max(distance)) for distance in distances])
     lows = [float(np.min(distance)) for distance in distances]
     usual = peaks[peaks <= WIDE * float(np.median(peaks))]
@@ -389,14 +413,17 @@ def _steps(values: Vector, ends: tuple[float, float]) -> Vector:
 
 
 def _at_most(values: Vector, x: Vector) -> NDArray[np.int_]:
-    """How many of the values do not exceed each x."""
+    """How many of `values` (n,) do not exceed each of `x` (m,); counts (m,)."""
     return np.searchsorted(np.sort(values), x, side="right")
 
 
 def _share_curve(
     axes: Axes, place: int, label: str, x: Vector, counts: NDArray[np.int_], n: int, level: float
 ) -> None:
-    """A share of draws [%] over x as steps, within its intervals."""
+    """Draw a share of draws [%] over `x` (m,) as steps, within its intervals.
+
+    `counts` (m,) of `n` draws are in the share. `place` chooses the style of the law.
+    """
     color, linestyle, _ = nth_style(place)
     percent = [100.0 * np.asarray(part) for part in statistics.share(counts, n, level)]
     axes.plot(x, percent[0], color=color, linestyle=linestyle, label=label, drawstyle="steps-post")
@@ -412,9 +439,10 @@ def _legend_of(law: str, values: Vector) -> str:
 
 
 def _span(axes: Axes, values: Mapping[str, Vector], *shown: float) -> tuple[float, float]:
-    """The horizontal axis: what all laws have but for their tails, logarithmic where it is wide.
+    """Set the horizontal axis to what all laws have but for their tails; returns its ends.
 
-    Returns its ends.
+    `values` are (draws,) by law; `shown` are further numbers to have on it. It is logarithmic where
+    the upper end is more than WIDE times the lower.
     """
     finite = [numbers[np.isfinite(numbers)] for numbers in values.values()]
     ends = [*shown, *(end for numbers in finite if len(numbers) for end in _without_tails(numbers))]
@@ -437,7 +465,7 @@ def _without_tails(numbers: Vector) -> list[float]:
 
 
 def _ratio_axis(axes: Axes, pairs: pd.DataFrame) -> tuple[float, float]:
-    """A logarithmic axis that is as long on both sides of 1; its ends."""
+    """Set a logarithmic axis of ratios that is as long on both sides of 1; returns its ends."""
     values = pairs[["ratio_low", "ratio", "ratio_high"]].to_numpy(float).ravel()
     usable = np.abs(np.log(values[np.isfinite(values) & (values > 0.0)]))
     reach = float(np.exp(1.15 * max(usable.max(initial=0.0), 0.02)))
@@ -445,6 +473,7 @@ def _ratio_axis(axes: Axes, pairs: pd.DataFrame) -> tuple[float, float]:
     axes.set_xlim(1.0 / reach, reach)
     ticks = [1.0]
     for tick in RATIOS:  # outwards from 1, where there is room
+        # A quarter of the half axis between labels keeps them apart.
         if tick < reach and tick / max(ticks) > reach**0.25:
             ticks += [tick, 1.0 / tick]
     axes.set_xticks(ticks, [f"{tick:.3g}" for tick in ticks])
@@ -460,7 +489,10 @@ def _pair(pair: pd.Series) -> str:
 
 
 def _write(axes: Axes, panel: Vector, low: float, high: float) -> None:
-    """Every number into its cell, in a colour that can be read there."""
+    """Write every number of `panel` (rows, columns) into its cell, in a readable colour.
+
+    `low` and `high` are the ends of the colour scale, whose lower half is dark.
+    """
     for (row, column), number in np.ndenumerate(panel):
         dark = np.isfinite(number) and number < (low + high) / 2.0
         text = "-" if np.isnan(number) else f"{number:.3g}"

@@ -65,6 +65,7 @@ def wanted_runs(results: Results) -> list[KeptRun]:
             *(w for name, count in keep.worst.items() for w in _worst(results, law, name, count)),
             *_name_runs(results.runs, law, keep.draws),
         ):
+            # Law, cell and draw name a run; of several reasons to keep it, the first counts.
             chosen.setdefault(run[:3], run)
     return list(chosen.values())
 
@@ -83,6 +84,7 @@ def _worst(results: Results, law: str, name: str, count: int) -> Iterator[KeptRu
     """The `count` successful runs of a law with the largest `name`, over all cells."""
     runs = results.runs
     values = np.where(runs.success(law), runs.metric(law, name), np.nan)
+    # NaN sorts last and is not taken.
     order = np.argsort(-values, axis=None, kind="stable")[: min(count, np.isfinite(values).sum())]
     for rank, place in enumerate(order.tolist(), 1):
         cell, draw = divmod(place, runs.wanted)
@@ -99,7 +101,10 @@ def _name_runs(runs: RunsTable, law: str, draws: Iterable[int]) -> Iterator[Kept
 
 
 def find_kept(folder: Path, results: Results, extras: Extras) -> list[Kept]:
-    """The kept runs, compared with the table; one that is not there or differs is missing."""
+    """The kept runs, each opened and compared with the table.
+
+    One that cannot be opened or differs is noted in `extras`.
+    """
     kept = [
         _open_kept(folder / LOGS / run.name, run, results, extras) for run in wanted_runs(results)
     ]
@@ -126,9 +131,13 @@ def _open_kept(path: Path, kept_run: KeptRun, results: Results, extras: Extras) 
 
 
 def difference(run: RunFolder, one: KeptRun, runs: RunsTable) -> str:
-    """The first metric in which a run differs from the table, with both values; "" if none does."""
+    """The first metric in which the log of `run` differs from the table, with both values.
+
+    `one` says which run of the table `runs` it is. The text is empty if no metric differs.
+    """
     for name in runs.metrics:
         ours, theirs = run.metrics.get(name), float(runs.metric(one.law, name)[one.cell, one.draw])
+        # A run's files have None for what is not finite.
         if ours != (theirs if math.isfinite(theirs) else None):
             return f"{name} is {ours!r} in the log and {theirs!r} in the table"
     return ""

@@ -51,10 +51,11 @@ def write_tables(folder: Path, results: Results) -> None:
 def write_report(
     folder: Path, results: Results, kept: Sequence[Kept], extras: Extras, *, figures: bool
 ) -> None:
-    """Draw the figures and write the report. Raises StorageError.
+    """Draw the figures and write report.html and figures/. Raises StorageError.
 
-    What fails is noted in the `extras`. Files of an earlier report that are not made again are
-    removed: they would tell of other runs.
+    `kept` are the runs with logs, whose tracks become a figure. A figure or page that fails is
+    noted in `extras`, and then listed in the file of missing things. Files of an earlier report
+    that are not made again are removed, since they would show other runs.
     """
     from podusv_cli.studies.telling import report
 
@@ -71,7 +72,10 @@ def write_report(
 
 
 def publish(folder: Path, drawn: dict[str, bytes], page: str | None, extras: Extras) -> None:
-    """Write figures, the report and what is missing, in place of earlier ones."""
+    """Write figures (`drawn`, by name), the report `page` and what is missing.
+
+    They replace earlier ones. Without a page (None), an old one is removed.
+    """
     _replace(folder / FIGURES, drawn)
     _replace(folder, {REPORT: (page or "").encode()} if page else {}, (REPORT,))
     missing = {MISSING: encode(extras.as_json())} if extras.missing else {}
@@ -79,7 +83,10 @@ def publish(folder: Path, drawn: dict[str, bytes], page: str | None, extras: Ext
 
 
 def _replace(folder: Path, contents: dict[str, bytes], only: Sequence[str] = ()) -> None:
-    """Write files into a folder; remove others of these names, or all PNG files there."""
+    """Write `contents` into a folder and remove older files that are not among them.
+
+    Older files are those named in `only`, or else all PNG files there.
+    """
     if contents:
         files.make_folder(folder)
         files.write_all({folder / name: content for name, content in contents.items()})
@@ -106,7 +113,7 @@ def export(runs: RunsTable, path: Path) -> None:
 
 
 def as_frame(runs: RunsTable) -> pd.DataFrame:
-    """Every run that is made as a row: law, cell, draw, what was drawn, how it ended, metrics."""
+    """Every run that is made as a row: law, cell, draw, drawn quantities, ending, metrics."""
     frames = [_frame(runs, law, cell) for law in runs.laws for cell in range(len(runs.cells))]
     import pandas as pd  # slow to import
 

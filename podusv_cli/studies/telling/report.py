@@ -53,7 +53,7 @@ def page(
     figures: Sequence[Picture],
     missing: Sequence[Failure],
 ) -> str:
-    """The whole report."""
+    """The whole report as HTML; what could not be made (`missing`) is listed in it."""
     about, beside = results.about, _beside(figures, len(results.runs.laws))
     ordered = [*beside, *(picture for picture in figures if picture not in beside)]
     numbered = [*enumerate(ordered, 1)]
@@ -103,10 +103,12 @@ def _laws(results: Results) -> Iterator[tuple[str, str, str, str, list[str]]]:
 def runs_that(results: Results, are: Any) -> Rows:
     """The worst runs of every law of which this is true; `are` gives a mask (cell, draw) of a law.
 
-    Of FIRST rows every law has as many as there are, or an equal share.
+    At most FIRST rows in all. The laws take turns, so that each has an equal share if it has as
+    many.
     """
     runs = results.runs
     masks: dict[str, Mask] = {law: are(law) & runs.done(law) for law in runs.laws}
+    # Sorted by rank first: the worst of each law, then the second of each.
     places = sorted(
         (rank, place, cell, draw)
         for place, law in enumerate(runs.laws)
@@ -121,17 +123,24 @@ def runs_that(results: Results, are: Any) -> Rows:
 
 
 def _worst(runs: RunsTable, law: str, mask: Mask) -> Any:
-    """Cell and draw of runs: those that ended first, then those that missed success by most."""
+    """Cell and draw (n, 2) of the runs in `mask` (cell, draw), the worst first.
+
+    Those that ended first, then those that missed success by most.
+    """
     cells, draws = np.nonzero(mask)
     finished = runs.finished(law)[mask]
     until = np.where(finished, 0.0, runs.until(law)[mask])
     missed = [-by[mask] for by in runs.shortfalls_of(law)]
+    # The last key is the first criterion; cell and draw only settle ties.
     order = np.lexsort((cells, draws, *reversed(missed), until, finished))
     return np.column_stack([cells, draws])[order]
 
 
 def _row(results: Results, drawn: Mapping[str, Any], place: tuple[str, int, int]) -> RunRow:
-    """A row of the report's table of runs; `place` is (law, cell, draw)."""
+    """A row of the report's table of runs.
+
+    `drawn` are the drawn quantities (draws,) by name, `place` is (law, cell, draw).
+    """
     runs, (law, cell, draw) = results.runs, place
     until = float(runs.until(law)[cell, draw])
     status = STATUSES[int(runs.status(law)[cell, draw])]
@@ -155,7 +164,11 @@ def _row(results: Results, drawn: Mapping[str, Any], place: tuple[str, int, int]
 
 
 def _decisive(results: Results, law: str, cell: int) -> list[str]:
-    """The drawn quantities that go together most with what success, or the answer, asks about."""
+    """At most DECISIVE drawn quantities that correlate most with the metric of success in a cell.
+
+    Without one in the success, the first shown metric is taken. Correlations within chance are left
+    out.
+    """
     metric, label = (
         (*results.runs.success_metrics, *results.shown_metrics)[0],
         results.runs.cells[cell],
@@ -171,7 +184,7 @@ def _decisive(results: Results, law: str, cell: int) -> list[str]:
 
 
 def _short_of(results: Results, law: str, cell: int, draw: int) -> str:
-    """Why a run that finished is no success: the metrics that decide."""
+    """Why a run that finished is no success: the metrics that success depends on, with values."""
     reasons = [
         f"{name} = {results.runs.metric(law, name)[cell, draw]:.5g}"
         for name in results.runs.success_metrics
@@ -186,7 +199,7 @@ def _pairs(results: Results) -> list[Any]:
 
 
 def _numbers(results: Results) -> list[list[str]]:
-    """Quantiles of the shown metrics, the median with its interval."""
+    """The table of quantiles of the shown metrics as text, the median with its interval."""
     return [
         [
             row["law"],
@@ -222,7 +235,10 @@ def _own(value: Any) -> str:
 
 
 def _beside(figures: Sequence[Picture], laws: int) -> list[Picture]:
-    """The first distribution, and the first ratios where these are few enough to stand there."""
+    """The first distribution, and the first ratios where these are few enough to stand there.
+
+    `laws` is how many laws there are.
+    """
     first = {picture.name.partition("-")[0]: picture for picture in reversed(figures)}
     kinds = ("distribution", "ratios") if laws <= FEW else ("distribution",)
     return [first[kind] for kind in kinds if kind in first]

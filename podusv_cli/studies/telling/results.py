@@ -81,7 +81,7 @@ class Results:
 
     @property
     def preliminary(self) -> str:
-        """How many draws the answer is about, in words; "" where none is missing."""
+        """How many draws the answer is about, as a phrase; "" where no run is missing."""
         if self.made_runs == self.wanted_runs:
             return ""
         draws, laws = int(np.sum(self.runs.common, axis=1).min()), len(self.runs.laws)
@@ -118,7 +118,10 @@ class Results:
         return replace(self, parsed=(), verdicts=(), contradicted=contradicted)
 
     def cells(self) -> tuple[list[str], list[list[str]]]:
-        """Head and rows of the table of the answer: failures and medians of every law."""
+        """Head and rows of the answer's table as text.
+
+        A row has the share of failures and the medians of a law (and cell).
+        """
         several, about = (
             len(self.runs.cells) > 1,
             [self.known_metrics[name] for name in self.shown_metrics],
@@ -140,7 +143,10 @@ class Results:
         return [failed, *self.medians(mine)]
 
     def medians(self, mine: Mapping[str, Mapping[str, Any]]) -> list[str]:
-        """Medians of the shown metrics in these rows, by metric; a dash where there is none."""
+        """Medians of the shown metrics as text, a dash where there is none.
+
+        `mine` are the summary rows of one law and cell, by metric.
+        """
         return [
             digits(number, infinite=self.known_metrics[name].infinite)
             for name in self.shown_metrics
@@ -159,12 +165,16 @@ class Results:
 
 
 def judge_study(about: StudyAbout, runs: RunsTable) -> Results:
-    """All tables and verdicts of a study's runs."""
+    """All tables and verdicts of a study's runs.
+
+    There are no intervals where draws are not independent.
+    """
     level, known = about.level, about.metrics
     parsed = [
         claims.ParsedStudyClaim(name, claim, claims.parse(claim.expect, about.laws, known))
         for name, claim in about.claims.items()
     ]
+    # The size of a seed means nothing, so it correlates with nothing.
     numbers = {
         q: values for q, values in runs.drawn_quantities.items() if not about.quantities[q].is_seed
     }

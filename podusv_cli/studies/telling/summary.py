@@ -20,7 +20,10 @@ Rows = list[dict[str, Any]]  # of a table, each by the names of the columns
 
 
 def summary(runs: StudyRuns, level: float, metrics: Known) -> Rows:
-    """For every law, cell and metric: failures and quantiles over all draws, with intervals."""
+    """For every law, cell and metric: failures and quantiles over all draws, with intervals.
+
+    `level` is the confidence of each interval, as 0.95.
+    """
     return [
         {
             **_failures(runs, law, cell, level),
@@ -43,9 +46,10 @@ def pairs(
 ) -> Rows:
     """For every metric, cell and two laws a and b: who wins how often, and the median of a / b.
 
-    Of the draws that both laws met. A win is a smaller metric by more than the margin, which is
-    relative; a larger one where more is better. `names` are those of the runs' laws that are
-    compared, by their names in the table; by default all.
+    Of the draws that both laws met. A win is a smaller metric by more than the `margin`, which is
+    relative (0.01 is 1 %); a larger one where more is better. `level` is the confidence of
+    intervals. `names` are those of the runs' laws that are compared, by their names in the table;
+    by default all.
     """
     laws = names or {law: law for law in runs.laws}
     return [
@@ -58,6 +62,7 @@ def pairs(
             **_pair(sign * of_a[used], sign * of_b[used], margin, level),
         }
         for name in _names(runs, metrics)
+        # More is better: the negated metric is compared.
         for sign in [-1.0 if metrics[name].margin else 1.0]
         for cell in range(len(runs.cells))
         for read in [{a: column_of(runs, law, cell, metrics[name]) for a, law in laws.items()}]
@@ -71,8 +76,9 @@ def pairs(
 def sensitivity(runs: StudyRuns, draws: Mapping[str, Any], level: float, metrics: Known) -> Rows:
     """Spearman's rank correlation of every metric with every drawn number, by law and cell.
 
-    Of the `n` draws in which the metric is known. `by_chance` is what unrelated quantities stay
-    within. Words that are drawn have no ranks.
+    `draws` are the drawn quantities (draws,) by name; words have no ranks and are left out. Column
+    `n` counts draws with the metric; `by_chance` is what unrelated quantities stay within at
+    `level`.
     """
     drawn = {name: np.asarray(values) for name, values in draws.items()}
     numbers = {name: values for name, values in drawn.items() if values.dtype.kind in "fiub"}
@@ -97,7 +103,10 @@ def sensitivity(runs: StudyRuns, draws: Mapping[str, Any], level: float, metrics
 
 
 def without_intervals(rows: Rows) -> Rows:
-    """The table with nothing in all columns that need independent draws."""
+    """The table with NaN in all columns that need independent draws.
+
+    These are ends of intervals, and what correlations reach by chance.
+    """
     return [
         {
             name: np.nan if name.endswith(ENDS) or name == "by_chance" else cell
@@ -113,7 +122,7 @@ def _names(runs: StudyRuns, metrics: Known) -> list[str]:
 
 
 def column_of(runs: StudyRuns, law: str, cell: int, about: MetricAbout) -> Vector | None:
-    """A metric of every draw of a cell, the `worst` for a run that failed; None where it has none.
+    """A metric (draws,) of a cell, the `worst` for a run that failed; None where the law has none.
 
     It has the metric where a run that succeeded has it, or where there is no such run.
     """
@@ -131,7 +140,10 @@ def _columns(runs: StudyRuns, law: str, cell: int, metrics: Known) -> Iterator[t
 
 
 def _failures(runs: StudyRuns, law: str, cell: int, level: float) -> dict[str, Any]:
-    """Failed draws of a law in a cell: counts, and their share with its interval."""
+    """Failed draws of a law in a cell: counts, and their share with its interval.
+
+    `level` is the confidence of the interval. Broken runs, which crashed or hung, count as failed.
+    """
     done: Mask = runs.done(law)[cell]
     failed, n = int(np.sum(done & ~runs.success(law)[cell])), int(np.sum(done))
     return {
@@ -153,7 +165,11 @@ def _quantiles(values: Vector, level: float) -> dict[str, Any]:
 
 
 def _pair(a: Vector, b: Vector, margin: float, level: float) -> dict[str, Any]:
-    """Two laws in the same draws (n,): wins, ties and ratio; less than `margin` apart is a tie."""
+    """Two laws in the same draws (n,): wins, ties and ratio.
+
+    Values within `margin` of each other, relative to the larger, are a tie; `level` is the
+    confidence.
+    """
     compared = statistics.pairs(a, b, margin)
     ratio = statistics.quantile(statistics.ratios(a, b), statistics.MEDIAN, level)
     return {

@@ -42,7 +42,7 @@ def _study(scenario: Scenario) -> Faults:
 
 
 def _budget(tune: Tune) -> Faults:
-    """A budget that is less than one batch."""
+    """A budget that is less than one batch: `batch` gains, each with all `train` draws."""
     least = tune.batch * tune.train
     if tune.budget < least:
         yield (

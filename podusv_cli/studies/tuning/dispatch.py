@@ -24,7 +24,7 @@ class SearchDriver:
     """Hands out the units of all searches, and gives each what comes back."""
 
     def __init__(self, searches: Sequence[GainSearch], tell: Tell) -> None:
-        """Every search is asked for its first units."""
+        """Ask every search for its first units; `tell` is called after each unit with the tally."""
         self._searches, self._tell = searches, tell
         self._waiting = deque[tuple[GainSearch, TrialUnit]]()
         self._busy: dict[int, tuple[GainSearch, TrialUnit]] = {}
@@ -54,7 +54,7 @@ class SearchDriver:
         return self._number, trial_unit[1], trial_unit[2]
 
     def take_outcome(self, number: int, outcome: Outcome) -> None:
-        """Give a search the result of a unit; runs of a process that ended are crashed."""
+        """Give a search the result of unit `number`; runs that ended their process are crashed."""
         search, (place, plan, unit) = self._busy.pop(number)
         if outcome.result:
             self._take(search, place, outcome.result[0])
@@ -64,7 +64,7 @@ class SearchDriver:
             self.failure = outcome.failure
 
     def _take(self, search: GainSearch, place: int, result: UnitResult) -> None:
-        """Give a search the result of its unit `place`, and plan what it asks for next."""
+        """Give a search the result of its trial at `place`, and queue what it asks for next."""
         self._add(search, search.take_result(place, result))
         self.tally.made += result.unit.count
         self.tally.failed += sum(map(bool, result.causes))
@@ -75,10 +75,11 @@ class SearchDriver:
 
 
 def dispatch(searches: Sequence[GainSearch], executor: Executor, tell: Tell) -> StudyTally:
-    """Bring all searches to the end of their budget.
+    """Bring all searches to the end of their budget; the tally of their runs.
 
-    Every batch is on the disk before the next of its search is asked for. Raises PodusvError where
-    a unit cannot be made at all, KeyboardInterrupt after an interrupt; finished batches are kept.
+    `tell` is called after each unit. Every batch is on the disk before the next of its search is
+    asked for. Raises PodusvError where a unit cannot be made at all, KeyboardInterrupt after an
+    interrupt; finished batches are kept.
     """
     driver = SearchDriver(searches, tell)
     finished = executor(driver, driver.take_outcome)

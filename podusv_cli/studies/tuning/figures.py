@@ -38,7 +38,7 @@ SMALL: dict[str, Any] = {"fontsize": 6.5}
 
 
 def sketches(results: SearchResults) -> Iterator[Sketch]:
-    """The figures that there are numbers for."""
+    """The figures for which there are numbers."""
 
     objective = results.plan.tune.objective
     yield Sketch(
@@ -90,7 +90,7 @@ def _of_searches(results: SearchResults, objective: str) -> Iterator[Sketch]:
 
 
 def _slices(results: SearchResults, law: str, objective: str) -> Sketch:
-    """The figure of all trials of a law over each of its gains."""
+    """The figure of all trials of a law over each of its gains; `objective` is its text."""
     tried = pd.DataFrame(
         [
             {
@@ -120,16 +120,21 @@ def _slices(results: SearchResults, law: str, objective: str) -> Sketch:
 
 
 def before_and_after(laws: pd.DataFrame, label: str) -> Figure:
-    """The objective of every law with its interval, before and after, best law on top."""
+    """The objective of every law with its interval, before and after, best law on top.
+
+    `laws` is the table `SearchResults.laws`, `label` the objective with its unit.
+    """
     ordered = laws.sort_values("objective_after", ignore_index=True)
     figure = new_figure(COLUMNS, FRAME + 1.4 * ROW * len(ordered))
     axes = figure.add_subplot()
     for row, law in ordered.iterrows():
+        # Both bars of a law lie on either side of its line.
         place = float(str(row))
         _draw_range(axes, place - 0.16, law, "before", "none")
         _draw_range(axes, place + 0.16, law, "after", nth_style(1)[0])
     for when, fill in (("before", "none"), ("after", nth_style(1)[0])):
         colour = nth_style(1 if when == "after" else 0)[0]
+        # Empty curves, for the legend only.
         axes.plot(
             [],
             [],
@@ -148,7 +153,10 @@ def before_and_after(laws: pd.DataFrame, label: str) -> Figure:
 
 
 def effort(table: pd.DataFrame, metric: str) -> Figure:
-    """Error over variation of the demand: each law before, and the middle half of its searches."""
+    """Error over variation of the demand: each law before, and the middle half of its searches.
+
+    `table` is `SearchResults.effort`, `metric` the name of its error.
+    """
     figure = new_figure(COLUMNS, 3.4)
     axes = figure.add_subplot()
     for place, (law, rows) in enumerate(table.groupby("law", sort=False)):
@@ -179,7 +187,10 @@ def effort(table: pd.DataFrame, metric: str) -> Figure:
 
 
 def _draw_range(axes: Axes, y: float, law: Any, when: str, fill: str) -> None:
-    """Draw a law's objective at height `y`: its interval as a line, the estimate as a dot."""
+    """Draw a law's objective at height `y`: its interval as a line, the estimate as a dot.
+
+    `law` is its row of `SearchResults.laws`, `when` before or after, `fill` the dot's colour.
+    """
     estimate, low, high = (law[f"objective_{when}{end}"] for end in ("", "_low", "_high"))
     colour = nth_style(0)[0] if when == "before" else nth_style(1)[0]
     if np.isfinite([low, high]).all():
@@ -189,7 +200,7 @@ def _draw_range(axes: Axes, y: float, law: Any, when: str, fill: str) -> None:
 
 
 def history(trials: pd.DataFrame, label: str) -> Figure:
-    """The best objective so far over simulated runs."""
+    """The best objective so far over simulated runs; `trials` is `SearchResults.history`."""
     figure = new_figure(COLUMNS, 2.8)
     axes = figure.add_subplot()
     for place, (law, rows) in enumerate(trials.groupby("law", sort=False)):
@@ -210,11 +221,12 @@ def history(trials: pd.DataFrame, label: str) -> Figure:
 
 
 def importance(table: pd.DataFrame) -> Figure:
-    """A panel for each law with a bar for each gain."""
+    """A panel for each law with a bar for each gain; `table` is `SearchResults.importance`."""
     laws = list(dict.fromkeys(table.law))
     across = min(len(laws), ACROSS - 1)
     down = math.ceil(len(laws) / across)
     most = int(table.groupby("law").size().max())
+    # In inches: 0.13 a bar, and 0.45 for title and axis.
     figure = new_figure(COLUMNS, down * (0.45 + 0.13 * most))
     panels = figure.subplots(down, across, squeeze=False).ravel()
     for law, axes in zip(laws, panels, strict=False):
@@ -238,7 +250,11 @@ def slices(
     label: str,
     units: Mapping[str, str],
 ) -> Figure:
-    """A panel for each gain of a law, a point for each trial."""
+    """A panel for each gain of a law, a point for each trial.
+
+    `tried` has a row a trial: gains, objective, repeat, whole. `winner` has the gains that were
+    found, `label` is the objective's, `units` are by gain.
+    """
     across = min(len(gains), ACROSS)
     down = math.ceil(len(gains) / across)
     figure = new_figure(COLUMNS, 0.3 + PANEL * down)
@@ -250,6 +266,8 @@ def slices(
         unit = f" [{units[gain.key]}]" if units[gain.key] not in ("", "1") else ""
         axes.set_xlabel(escaping.figure(f"{gain.key}{unit}"), **SMALL)
     if len(shown):
+        # The first trial has the scenario's gains. Trials far worse than it would flatten all
+        # others.
         low, start = float(shown.min()), float(values[0])
         top = (
             TOP * start if math.isfinite(start) and start > 0.0 else float(np.quantile(shown, 0.75))
@@ -263,7 +281,11 @@ def slices(
 
 
 def _slice(axes: Axes, gain: Gain, tried: pd.DataFrame, winner: Any) -> None:
-    """Draw the trials over one gain; lines at the gain that was found and the scenario's own."""
+    """Draw the trials over one gain, and lines at the found gain and the scenario's own.
+
+    `winner` is the gain that was found, a number or a word.
+    """
+    # Words stand at whole numbers in their order.
     if gain.words:
         places = {word: place for place, word in enumerate(gain.words)}
         x = tried[gain.key].map(places)

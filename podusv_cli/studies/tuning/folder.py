@@ -87,9 +87,10 @@ def _read_asked(noted: TuneRecord | None) -> list[dict[str, Any]]:
 def write(
     folder: Path, plan: TunePlan, noted: TuneRecord | None, started: str, texts: Mapping[str, str]
 ) -> None:
-    """Note what is asked for, after what is `known` of the search.
+    """Note in tune.json what is asked for, after the earlier calls in `noted`.
 
-    `texts` has the scenario and its plug-ins by the names of their files. Raises StorageError.
+    `started` is the time of this call in ISO 8601. `texts` has the scenario and its plug-ins by the
+    names of their files. Raises StorageError.
     """
     content = json_text.encode(_content(plan, _read_asked(noted), started))
     # With a larger budget in tune.json than in the scenario, the search could not be continued. And
@@ -109,7 +110,10 @@ def _identity(plan: TunePlan) -> dict[str, Any]:
 
 
 def _content(plan: TunePlan, history: Sequence[Any], started: str) -> dict[str, Any]:
-    """What tune.json says; `started` is when this run of the command began."""
+    """What tune.json says: the search, its identity, and all calls.
+
+    `history` are the earlier ones.
+    """
     tune = plan.tune
     asked = {
         "budget": tune.budget,
@@ -129,7 +133,7 @@ def _content(plan: TunePlan, history: Sequence[Any], started: str) -> dict[str, 
 
 
 def _as_much(folder: Path, history: Sequence[Mapping[str, Any]], tune: Tune) -> None:
-    """Raise UsageError where runs that are there would be thrown away."""
+    """Raise UsageError where less is asked for than `history`, since runs would be thrown away."""
     for key, unit in (("budget", "runs"), ("repeats", "searches"), ("validate", "fresh draws")):
         there = max((call[key] for call in history), default=0)
         if getattr(tune, key) < there:
@@ -151,6 +155,7 @@ def tuned_yaml(results: SearchResults) -> bytes:
     end = "-tuned"
     tuned = {
         "extends": SCENARIO,
+        # A name has a greatest length, which the ending must not exceed.
         "name": f"{scenario.name[: LONGEST_NAME - len(end)]}{end}",
         "description": _tell_results(results),
         "controllers": {law: content for law, content in laws.items() if content},
@@ -160,7 +165,7 @@ def tuned_yaml(results: SearchResults) -> bytes:
 
 
 def _tell_results(results: SearchResults) -> str:
-    """The sentence at the head of tuned.yaml."""
+    """The sentence at the head of tuned.yaml: what was minimised, with how many runs and draws."""
     tune = results.plan.tune
     searches: Sequence[str] = [f"{tune.budget} runs", f"{tune.train} draws"]
     what = tune.objective

@@ -44,17 +44,18 @@ def find_idle(plan: TunePlan, workers: int) -> dict[str, tuple[str, ...]]:
 
 
 def _of_law(plan: TunePlan, law: str, progress: Progress) -> tuple[str, ...]:
-    """The gains of a law that change no run when they change."""
+    """The keys of the gains of a law that change no run when they change."""
     left = list(plan.gains[law])
     for place, point in enumerate(_points(plan, law)):
         run = partial(_run, plan, law, place % plan.tune.train)
+        # A law may refuse a point; then the next one has to tell.
         if left and (own := run(point)):
             left = [gain for gain in left if not _matters(run, own, point, gain)]
     return tuple(gain.key for gain in left)
 
 
 def _points(plan: TunePlan, law: str) -> Iterator[Gains]:
-    """Gains to try: the scenario's own, then drawn ones."""
+    """Gains to try: the scenario's own, then POINTS - 1 random points of the space."""
     gains = plan.gains[law]
     yield {gain.key: gain.own for gain in gains}
     assert plan.scenario.sweep
@@ -68,13 +69,16 @@ def _points(plan: TunePlan, law: str) -> Iterator[Gains]:
 
 
 def _matters(run: Any, own: UnitResult, point: Gains, gain: Gain) -> bool:
-    """Whether another value of the gain changes the run `own` at this point."""
+    """Whether an end of the gain's range changes the run at this point, or is refused.
+
+    `run` simulates given gains; `own` is its result at `point`.
+    """
     others = (run({**point, gain.key: end}) for end in gain.ends)
     return any(other is None or _differ(own, other) for other in others)
 
 
 def _run(plan: TunePlan, law: str, draw: int, gains: Gains) -> UnitResult | None:
-    """One run with these gains; None where the law refuses them."""
+    """One run with these gains in training draw number `draw`; None where the law refuses them."""
     if with_gains(plan.laws[law], gains) is None:
         return None
     return make(plan.variant({law: (law, gains)}, TRAIN, draw + 1), Unit(law, 0, draw, 1))

@@ -67,7 +67,10 @@ class OfGains(OfRuns):
     names: list[str] = field(default_factory=list)  # of the metrics that were met
 
     def quantity(self, node: ast.expr) -> Vector:
-        """A metric's name."""
+        """The values (draws,) of a metric that is written by its name alone.
+
+        Raises ExpressionError.
+        """
         if not isinstance(node, ast.Name):
             refuse(node, "write metrics by their names alone, as in median(iae)")
         name = known_name(node.id, self.metrics, "metric")
@@ -81,7 +84,7 @@ class OfGains(OfRuns):
 
 
 def parse_objective(text: str, metrics: Mapping[str, Metric]) -> ast.expr:
-    """The tree of an objective. Raises ExpressionError."""
+    """The tree of an objective, which must depend on a run's numbers. Raises ExpressionError."""
     tree = syntax_tree(text, EXAMPLE)
     if not _names(tree, metrics):
         refuse(tree, f"is a number, whatever the gains are; example: {EXAMPLE}")
@@ -89,7 +92,10 @@ def parse_objective(text: str, metrics: Mapping[str, Metric]) -> ast.expr:
 
 
 def parse_inequality(text: str, metrics: Mapping[str, Metric]) -> Inequality:
-    """A statistic compared with a number. Raises ExpressionError."""
+    """An inequality (`text`) that compares one statistic of the draws with a number.
+
+    Raises ExpressionError for anything else.
+    """
     tree = syntax_tree(text, INEQUALITY)
     match tree:
         case ast.Compare(left=left, ops=[sign], comparators=[right]) if type(sign) in SIGNS:
@@ -106,9 +112,10 @@ def metrics_in(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
 
 
 def _names(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
-    """What an expression is about, as its evaluation on invented runs shows.
+    """The names that an expression is about, found by evaluating it on invented runs.
 
-    These are many and all differ, so that a spread of theirs is not zero. Raises ExpressionError.
+    These are many and all differ, so that a spread of theirs is not zero. Raises ExpressionError,
+    also where the expression is never finite.
     """
     numbers = np.random.default_rng(0).uniform(1.0, 2.0, (len(metrics), INVENTED))
     walk = OfGains(
@@ -124,9 +131,9 @@ def _names(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
 def evaluate(
     tree: ast.expr, runs: Outcomes, metrics: Mapping[str, Metric], worst: float = math.inf
 ) -> float:
-    """The number of an objective; infinite where it is the worst or not known.
+    """The value of an objective over `runs`; infinite where it is the worst or not known.
 
-    `worst` is minus infinity where less is worse.
+    `worst` stands for a failed run's number: minus infinity where less is worse.
     """
     with np.errstate(all="ignore"):
         reached = float(_evaluate(tree, OfGains(metrics, runs=runs), worst))
@@ -134,7 +141,10 @@ def evaluate(
 
 
 def excess(inequality: Inequality, runs: Outcomes, metrics: Mapping[str, Metric]) -> float:
-    """By how much an inequality does not hold, relative to its bound; 0 or less where it holds."""
+    """By how much an inequality does not hold, relative to its bound; 0 or less where it holds.
+
+    Relative to 1 where the bound is 0; infinite where the statistic is.
+    """
     reached = evaluate(inequality.tree, runs, metrics, -math.inf if inequality.upward else math.inf)
     over = (
         inequality.bound - reached
@@ -147,7 +157,8 @@ def excess(inequality: Inequality, runs: Outcomes, metrics: Mapping[str, Metric]
 def _evaluate(node: ast.expr, walk: OfGains, worst: float) -> Any:
     """The value of an expression; `worst` is what stands for a failed run, inf or -inf.
 
-    Its sign follows the operators, so that a failure never improves the whole.
+    The sign of `worst` follows the operators, so that a failure never improves the whole: in a - b,
+    the worst of b is its smallest value.
     """
     match node:
         case ast.Constant():
@@ -178,6 +189,7 @@ def _is_negative(node: ast.expr) -> bool:
 def _quantile(call: ast.Call, walk: OfGains, worst: float) -> Any:
     """The value of `quantile(...)` or `median(...)` over the draws."""
     share = share_of(call)
+    # Only the estimate is used, so any level will do.
     return statistics.quantile(numbers_of(call, walk, worst), share, 0.5).estimate
 
 
@@ -191,6 +203,6 @@ def numbers_of(call: ast.Call, walk: OfGains, worst: float = math.inf) -> Vector
 
 
 def share_of(call: ast.Call) -> float:
-    """Which quantile a statistic is, from 0 to 1. Raises ExpressionError."""
+    """Which quantile a statistic is, from 0 to 1 (a median is 0.5). Raises ExpressionError."""
     known_name(function(call), STATISTICS, "statistic")
     return part_of(call, RUNS)[1]

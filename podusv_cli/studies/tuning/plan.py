@@ -89,7 +89,10 @@ class TunePlan:
         return parse_success(self.scenario.sweep.success, self.metrics)
 
     def runs_wanted(self) -> dict[str, tuple[int, int]]:
-        """For every law, the runs of the search and those on the draws for validation."""
+        """For every law, the runs of its searches and those on the draws for validation.
+
+        The scenario's gains and those of each search meet all draws for validation.
+        """
         tune = self.tune
         return {
             law: (tune.searches * tune.budget, (1 + tune.searches) * tune.validate)
@@ -117,7 +120,7 @@ class TunePlan:
 
     @property
     def size(self) -> str:
-        """How many runs there are, in words."""
+        """How many runs the searches and their validation take, in words."""
         search, other = (sum(n) for n in zip(*self.runs_wanted().values(), strict=True))
         tune = self.tune
         return (
@@ -132,20 +135,27 @@ class TunePlan:
         return StudyPlan(self.scenario, (Cell(0, (), self.scenario),))
 
     def stream(self, search: int) -> str:
-        """The stream of the draws that a search is trained on."""
+        """The name of the stream of training draws of search number `search` (from 0).
+
+        Training sets are given out in turn; searches n and n + training_sets share one.
+        """
         training_set = search % self.tune.training_sets
         return f"{TRAIN} {training_set}" if training_set else TRAIN
 
     def variant(self, laws: Mapping[str, Contestant], stream: str, draws: int) -> StudyPlan:
-        """The study of laws by their new names, on draws of a stream."""
+        """The study of `laws`, by their new names, on `draws` draws of a stream."""
         renamed = tuple((name, law, tuple(new.items())) for name, (law, new) in laws.items())
         return self.base.with_variant(Variant(stream, draws, renamed))
 
     def runs(self, results: list[UnitResult]) -> Outcomes:
-        """The runs of some units, in their order; failed is what the study calls no success."""
+        """The runs of some units of one law, in their order.
+
+        Failed are those that the study does not call a success.
+        """
         import numpy as np
 
         names = dict.fromkeys(name for result in results for name in result.metrics)
+        # A unit whose gains the law refused has no metrics.
         blank = {id(result): np.full(result.unit.count, np.nan) for result in results}
         metrics = {
             name: np.concatenate(
@@ -158,7 +168,7 @@ class TunePlan:
 
     @cached_property
     def identity(self) -> dict[str, Any]:
-        """All that the trials depend on, by dotted keys."""
+        """All that the trials depend on, by dotted keys; searches that agree can be continued."""
         whole = self.variant({law: (law, {}) for law in self.laws}, TRAIN, self.tune.train)
         settings = {f"tune.{k}": v for k, v in self.tune.model_dump(exclude=set(OPEN)).items()}
         assert self.scenario.sweep

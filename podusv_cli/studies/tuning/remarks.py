@@ -17,7 +17,7 @@ BETTER = 0.8  # of the others' error: a law that ought to be noticed
 
 
 def remarks(results: SearchResults) -> list[str]:
-    """The answer first, then what it hangs on, and what a user may want to change."""
+    """Sentences on the result: answer, what it depends on, what a user may want to change."""
     return [
         *_answer(results),
         *_power(results),
@@ -41,6 +41,7 @@ def _answer(results: SearchResults) -> Iterator[str]:
         return
     best, second = ordered[:2]
     rows: Any = results.searches.to_dict("records")
+    # The pair may stand in the table in either order.
     for row in rows:
         if {row["a"], row["b"]} == {best, second}:
             yield (
@@ -74,7 +75,7 @@ def _remark_unsettled(results: SearchResults) -> Iterator[str]:
 
 
 def _once(results: SearchResults) -> Iterator[str]:
-    """Too few searches or training sets to order laws by."""
+    """A warning where there are too few searches or training sets to order laws by."""
     tune = results.plan.tune
     if len(results.plan.laws) < 2:
         return
@@ -92,7 +93,10 @@ def _once(results: SearchResults) -> Iterator[str]:
 
 
 def _verdict(row: dict[str, Any]) -> str:
-    """Which law of a pair is better, by the interval of their ratio."""
+    """Which law of a pair is better, by the interval of the ratio a / b of their objectives.
+
+    Less is better. `row` is one of the table of `ratios`.
+    """
     if row["ratio_high"] < 1.0:
         return f"{row['a']} is better"
     if row["ratio_low"] > 1.0:
@@ -145,7 +149,10 @@ def _few(results: SearchResults) -> Iterator[str]:
 
 
 def _remark_overfitted(results: SearchResults) -> Iterator[str]:
-    """Laws whose chosen search is not the best one on fresh draws."""
+    """Laws of which another search than the chosen one does better on fresh draws.
+
+    The difference is over MARGIN.
+    """
     for law in results.winners:
         reached = results.spread(law)
         taken = reached[results.winners[law].index(results.winner(law))]
@@ -159,7 +166,7 @@ def _remark_overfitted(results: SearchResults) -> Iterator[str]:
 
 
 def _beyond(results: SearchResults) -> Iterator[str]:
-    """Inequalities that gains hold on the training draws, and not on the fresh ones."""
+    """Inequalities that the found gains hold on the training draws, and not on the fresh ones."""
     table = results.limits
     after: Any = table[table["when"] == "after"].to_dict("records")
     for row in after:

@@ -25,7 +25,10 @@ FEW = 15  # pairs that are shown at once
 def page(
     folder: Path, results: SearchResults, figures: Sequence[Picture], missing: Sequence[Failure]
 ) -> str:
-    """The whole report."""
+    """The whole report as HTML.
+
+    `folder` is that of the search, `missing` what could not be drawn or written.
+    """
     plan = results.plan
     assert plan.scenario.sweep
     numbered = [*enumerate(figures, 1)]
@@ -102,7 +105,10 @@ def ratio(row: Any) -> str:
 
 
 def spread(row: Any) -> str:
-    """The median, the least and the largest objective of the searches' winners."""
+    """The objective of the searches' winners: median (least to largest).
+
+    `row` is one of the answer's table. A dash for a single search.
+    """
     middle, low, high = (row[f"repeats_{end}"] for end in ("median", "low", "high"))
     if math.isnan(low) or low == high:
         return "-"
@@ -110,7 +116,10 @@ def spread(row: Any) -> str:
 
 
 def place(row: Any) -> str:
-    """The ranks that the law may have."""
+    """The ranks that the law may have, from the best to the worst; a dash where they are unknown.
+
+    `row` is one of the answer's table.
+    """
     low, high = row["place_low"], row["place_high"]
     if math.isnan(low):
         return "-"
@@ -118,7 +127,7 @@ def place(row: Any) -> str:
 
 
 def _pairs(results: SearchResults) -> Iterator[dict[str, Any]]:
-    """Every pair of laws with its numbers before and after."""
+    """Every pair of laws with its numbers before and after, for the first metric."""
     table = results.pairs
     table = table[table.metric.isin(results.shown_metrics[:1])]
     by = {when: rows.to_dict("records") for when, rows in table.groupby("when")}
@@ -135,7 +144,10 @@ def _pairs(results: SearchResults) -> Iterator[dict[str, Any]]:
 
 
 def _order_change(before: Any, after: Any) -> str:
-    """Whether the search turned the order of two laws, beyond doubt."""
+    """Which law overtakes the other by the search, with both intervals clear of 1; else empty.
+
+    `before` and `after` are rows of the same pair.
+    """
     if before["ratio_low"] > 1.0 > after["ratio_high"]:
         return f"{before['a']} overtakes"
     if before["ratio_high"] < 1.0 < after["ratio_low"]:

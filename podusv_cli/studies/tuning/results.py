@@ -61,7 +61,7 @@ class SearchResults:
 
     @property
     def runs_spent(self) -> dict[str, int]:
-        """The simulated runs of the search by law."""
+        """How many runs the searches of each law simulated, by law."""
         return {
             law: sum(trial.runs for repeat in repeats for trial in repeat)
             for law, repeats in self.trials.items()
@@ -120,6 +120,7 @@ class SearchResults:
     def settles(self, law: str, when: str) -> bool:
         """Whether a law ends at its target in at least half of the fresh draws, before or after."""
         met = self.outcomes_of(law if when == "before" else self.after(law))
+        # Whether a law aims at a target at all is the law's own.
         scenario = self.plan.scenario.model_copy(update={"controller": self.plan.laws[law]})
         ends = [
             not failed and scenario.at_target({name: met.metrics[name][i] for name in met.metrics})
@@ -134,7 +135,10 @@ class SearchResults:
 
     @cached_property
     def pairs_of_laws(self) -> LawRatios:
-        """Every pair of laws over all of their searches and the fresh draws."""
+        """Every pair of laws by the first metric.
+
+        All searches and the fresh draws count.
+        """
         metric = self.shown_metrics[0]
         runs = {}
         for law in self.plan.laws:
@@ -149,7 +153,10 @@ class SearchResults:
         return searched_names(law, self.trials[law]) if law in self.trials else [law]
 
     def _better_than(self, law: str, when: str) -> int:
-        """How many laws this one is better than in the typical draw, the whole interval of it."""
+        """How many laws this one beats in the same draw, with the whole interval of the ratio.
+
+        `when` is before or after.
+        """
         pairs = self.pairs
         if not len(pairs):
             return 0
@@ -168,6 +175,7 @@ class SearchResults:
         pairs = self.pairs
         own = pairs[(pairs["when"] == "tuning") & (pairs.a == tuned_name(law))]
         own = own[own.metric == self.shown_metrics[0]]
+        # A law that was not searched is its own before and after.
         for end in ("ratio", "ratio_low", "ratio_high"):
             row[end] = float(own[end].iloc[0]) if len(own) else 1.0
         spread = self.spread(law)
@@ -176,7 +184,10 @@ class SearchResults:
         return row
 
     def objective(self, runs: Outcomes, tree: ast.expr) -> Interval:
-        """An objective, with an interval where it is one quantile of one number."""
+        """The value of an objective or statistic, with an interval where it is one quantile.
+
+        NaN ends for anything else, such as a sum.
+        """
         number = evaluate(tree, runs, self.plan.metrics)
         if not isinstance(tree, ast.Call):
             return Interval(number, math.nan, math.nan)
@@ -253,6 +264,7 @@ class SearchResults:
         compared = [
             ("before", {law: law for law in self.plan.laws}),
             ("after", {law: self.after(law) for law in self.plan.laws}),
+            # The tuned law first, so that a ratio below 1 is an improvement.
             *(("tuning", {tuned_name(law): tuned_name(law), law: law}) for law in self.winners),
         ]
         tables = [
@@ -307,7 +319,10 @@ class SearchResults:
         return pd.DataFrame(rows, columns=["law", "gain", "importance", "low", "high"])
 
     def _importances(self, law: str) -> Iterator[dict[str, float]]:
-        """Of each search's trials without one part of them after the other."""
+        """The importances of gains, PARTS times for each search.
+
+        Each time another part of the trials is left out. Searches with too few trials give none.
+        """
         for trials in self.trials[law]:
             for part in range(PARTS):
                 kept = [trial for place, trial in enumerate(trials) if place % PARTS != part]
@@ -346,16 +361,17 @@ def _ends(gain: Gain) -> dict[str, float]:
 
 
 def _range(values: Sequence[float]) -> dict[str, float]:
-    """Mean, least and largest of an importance over searches."""
+    """Mean, least and largest of the importances `values` of one gain."""
     return {"importance": float(np.mean(values)), "low": min(values), "high": max(values)}
 
 
 def _history(law: str, repeat: int, trials: Sequence[GainTrial]) -> Iterator[dict[str, Any]]:
-    """A row for each trial of a search: runs spent so far, and the best value so far."""
+    """A row for each trial of a search: runs spent so far, and the best objective so far."""
     spent, leader = 0, (math.inf, math.inf)
     for trial in trials:
         spent += trial.runs
         if trial.status == FINISHED:
+            # Inequalities come before the objective, as in `trials.best`.
             leader = min(leader, (trial.excess, trial.value))
         yield {
             "law": law,

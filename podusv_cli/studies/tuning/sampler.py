@@ -19,7 +19,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.studies.tuning.space import Gain
 
 STARTUP = 8  # trials before TPE takes over from random numbers: the first batch
-WORST = 1e30  # what a sampler is told in place of infinity
+WORST = 1e30  # what a sampler gets in place of infinity
 Values = Sequence[float]
 
 
@@ -37,7 +37,10 @@ class Sampler:
     """The trials of one search as Optuna sees them, in memory."""
 
     def __init__(self, gains: Sequence[Gain], seed: Sequence[Any]) -> None:
-        """`seed` is what the random numbers depend on, beside the number of a batch."""
+        """`seed` is what the random numbers depend on, beside the number of a batch.
+
+        The scenario's own gains are queued as the first trial.
+        """
         self._optuna, self._gains, self._seed = optuna(), gains, seed
         self._study = self._optuna.create_study()
         self._asked: list[Any] = []
@@ -45,7 +48,10 @@ class Sampler:
         self._study.enqueue_trial({k: v for k, v in own.items() if v is not None})
 
     def ask(self, batch: int, count: int) -> list[dict[str, Any]]:
-        """The gains of a batch's trials; the first of all are the scenario's."""
+        """The gains of `count` trials of batch number `batch` (from 0).
+
+        The first trial of batch 0 has the gains of the scenario.
+        """
         with _quiet():
             self._study.sampler = self._sampler_for(batch)
             self._asked = [self._study.ask() for _ in range(count)]
@@ -55,7 +61,11 @@ class Sampler:
         return asked
 
     def tell(self, values: Values, excesses: Sequence[Values]) -> None:
-        """The objective of the trials asked last, and by how much inequalities do not hold."""
+        """Take in the objective of each trial asked last, and its excess of every inequality.
+
+        `values` are (trials,), `excesses` (trials, inequalities); above 0, an inequality does not
+        hold.
+        """
         with _quiet():
             for trial, number, over in zip(self._asked, values, excesses, strict=True):
                 for place, excess in enumerate(over):
@@ -94,7 +104,8 @@ def importances(
 ) -> dict[str, float]:
     """How much of an objective's variation over good trials each gain explains, adding up to 1.
 
-    PED-ANOVA (Watanabe et al., IJCAI 2023), of the best tenth of the trials within all.
+    `tried` are the gains and `values` the objectives of all trials. PED-ANOVA (Watanabe et al.,
+    IJCAI 2023), of the best tenth of the trials within all. Empty where all values are equal.
     """
     module = optuna()
     kinds = module.distributions
@@ -110,6 +121,7 @@ def importances(
         study = module.create_study()
         for trial, number in zip(tried, values, strict=True):
             params = {gain.key: trial[gain.key] for gain in gains if gain.in_range(trial[gain.key])}
+            # The scenario's own gains may lie outside of the ranges, and failures have no number.
             if len(params) == len(space) and math.isfinite(number):
                 study.add_trial(
                     module.trial.create_trial(params=params, distributions=space, value=number)

@@ -49,7 +49,10 @@ class GainSearch:
     """The search for the gains of a law with one of the tuner's seeds."""
 
     def __init__(self, plan: TunePlan, law: str, number: int, folder: Path) -> None:
-        """Nothing is asked yet. `folder` holds the trials of an earlier session, if any."""
+        """Nothing is asked yet. `number` counts the law's searches; it also seeds the sampler.
+
+        `folder` holds the trials of an earlier session, if any.
+        """
         self.plan, self.law, self.number, self._folder = plan, law, number, folder
         assert plan.scenario.sweep
         seed = [plan.scenario.sweep.seed, number, law]
@@ -79,7 +82,8 @@ class GainSearch:
     def begin(self) -> list[tuple[int, StudyPlan, Unit]]:
         """The first units of the next batch that has to be simulated; none when the budget is used.
 
-        Batches that an earlier session has finished are told to the sampler.
+        A unit comes with its trial's place in the batch. Batches that an earlier session has
+        finished are given to the sampler without being simulated again.
         """
         while (left := self.plan.tune.budget - self.runs_spent) > 0:
             self._ask(left)
@@ -91,15 +95,22 @@ class GainSearch:
         return []
 
     def _first_units(self) -> list[tuple[int, StudyPlan, Unit]]:
-        """The first units of a batch; none where the law refuses all gains, and the batch ends."""
+        """The units of a batch's first draws.
+
+        Empty where the law refuses all gains; then the batch ends.
+        """
         draws = self._attempts[0].draws
+        # Refused gains fail at once, in both steps.
         units = self._units(min(self.first, draws)) or self._units(draws)
         if not units:
             self._end()
         return units
 
     def _ask(self, left: int) -> None:
-        """As many trials as the budget has whole ones for; the last one is cut to what is left."""
+        """Ask for the trials of a batch, as many as there is budget for (`left`, in runs).
+
+        If it does not suffice for a whole trial, a single one is cut to what is left.
+        """
         tune = self.plan.tune
         count, draws = min(tune.batch, left // tune.train), tune.train
         if not count:
@@ -109,16 +120,20 @@ class GainSearch:
         ]
 
     def _attempt(self, gains: dict[str, object], draws: int) -> Attempt:
-        """These gains with so many draws to meet; without a plan where the law refuses them."""
+        """A trial of these gains, to meet `draws` draws.
+
+        It has no plan where the law refuses the gains.
+        """
         taken = with_gains(self.plan.laws[self.law], gains)
         named = {self.law: (self.law, gains)}
         stream = self.plan.stream(self.number)
         return Attempt(gains, draws, self.plan.variant(named, stream, draws) if taken else None, [])
 
     def _known_trials(self) -> list[GainTrial] | None:
-        """The trials of this batch in the file; none for a batch that a smaller budget cut.
+        """The trials of this batch in the file; None where it has to be simulated.
 
-        Raises StorageError where the file has other gains than those asked for.
+        That is so for a batch that is missing or that a smaller budget cut. Raises StorageError
+        where the file has other gains than those asked for.
         """
         kept = [trial for trial in self._kept if trial.batch == self._batch]
         whole = [attempt.draws == self.plan.tune.train for attempt in self._attempts]
@@ -133,7 +148,10 @@ class GainSearch:
         return kept
 
     def _units(self, until: int) -> list[tuple[int, StudyPlan, Unit]]:
-        """The units that take every attempt to so many draws; those refused fail at once."""
+        """The units that take every attempt to `until` draws, with its place in the batch.
+
+        Pruned attempts get none; those that the law refuses fail at once.
+        """
         units = []
         for place, attempt in enumerate(self._attempts):
             unit = Unit(self.law, 0, attempt.draws_met, until - attempt.draws_met)
@@ -153,13 +171,16 @@ class GainSearch:
         return UnitResult(unit, {}, status, nothing, ("the law refuses these gains",) * unit.count)
 
     def take_result(self, place: int, result: UnitResult) -> list[tuple[int, StudyPlan, Unit]]:
-        """Take in a unit; the units that follow once all of its step are there."""
+        """Take in the result of the trial at `place`, and return the units to make next.
+
+        Units follow once all results of the step are in.
+        """
         self._attempts[place].results.append(result)
         self._waiting -= 1
         return [] if self._waiting else self._next()
 
     def _next(self) -> list[tuple[int, StudyPlan, Unit]]:
-        """The next units: of this batch, or of the one after it."""
+        """The next units: the rest of this batch's draws, or the first of the batch after it."""
         more = self._units(self._attempts[0].draws)
         if more:
             return more
@@ -172,7 +193,11 @@ class GainSearch:
         trials.write(self._folder, self.name, self.trials)
 
     def _is_over(self, attempt: Attempt) -> bool:
-        """Whether a trial is pruned: a sound one of earlier batches is far better."""
+        """Whether a trial is pruned after the first draws.
+
+        It is if a sound trial of earlier batches is far better on these draws.
+        """
+        # The very first batch is never pruned, as nothing is known to compare with.
         if not self.trials or attempt.draws_met < self.first:
             return False
         value = self._value(self._first(attempt))
@@ -180,7 +205,10 @@ class GainSearch:
         return any(_far(trial.first, value) for trial in sound)
 
     def _make_trials(self) -> Iterator[GainTrial]:
-        """The trials of the batch that is over: finished, pruned, or cut short by the budget."""
+        """The trials of the batch that is over: finished, pruned, or cut short by the budget.
+
+        A trial that was cut was to meet fewer draws than `train` from the start.
+        """
         tune = self.plan.tune
         for place, attempt in enumerate(self._attempts):
             runs, met = self._runs(attempt), attempt.draws_met
@@ -200,7 +228,7 @@ class GainSearch:
             )
 
     def _tell_sampler(self, made: Sequence[GainTrial]) -> None:
-        """Give the sampler what came out, and choose the leader of all trials."""
+        """Give the sampler the results, and choose the leader of all trials."""
         self._sampler.tell([t.value for t in made], [t.excesses for t in made])
         self.trials += made
         self.leader = trials.best(self.trials)
@@ -210,14 +238,15 @@ class GainSearch:
         return self.plan.runs(attempt.results)
 
     def _first(self, attempt: Attempt) -> Outcomes:
-        """The runs of the first draws."""
+        """The runs of a trial's first draws, by which trials are compared for pruning."""
         metrics, failed = self._runs(attempt)
         return Outcomes({n: v[: self.first] for n, v in metrics.items()}, failed[: self.first])
 
     def _value(self, runs: Outcomes) -> float:
+        """The objective of some runs; less is better."""
         return evaluate(self.plan.objective, runs, self.plan.metrics)
 
 
 def _far(best: float, value: float) -> bool:
-    """Whether a value is worse than the best by more than half of it."""
+    """Whether a value is worse than the best by more than WORSE - 1 times its size."""
     return value > best + (WORSE - 1.0) * abs(best)

@@ -38,7 +38,10 @@ class LawRatios:
 
     @cached_property
     def _off(self) -> Vector:
-        """How far the samples of a pair are off, in standard deviations, of pairs that have any."""
+        """The samples' deviations from the ratio, in standard deviations; (pair, sample).
+
+        Only pairs whose samples are all finite and differ.
+        """
         with np.errstate(invalid="ignore"):
             off = self.samples - self.ratios[:, None]
         sure = [gaps / gaps.std() for gaps in off if np.isfinite(gaps).all() and gaps.std() > 0.0]
@@ -51,7 +54,7 @@ class LawRatios:
         return float(np.quantile(largest, self.level)) if len(self._off) else 0.0
 
     def table(self) -> pd.DataFrame:
-        """The ratio of every pair with an interval; all intervals hold together."""
+        """The ratio of every pair with an interval; all intervals hold together, at `level`."""
         rows = [
             (
                 *pair,
@@ -66,7 +69,7 @@ class LawRatios:
     def omnibus(self) -> float:
         """The probability of a largest difference like this, or larger, where all laws are equal.
 
-        NaN where a pair has no interval.
+        A p-value by the bootstrap's largest deviation; NaN where a pair has no interval.
         """
         if len(self._off) < len(self.pairs) or not self.pairs:
             return float("nan")
@@ -82,11 +85,15 @@ class LawRatios:
         if len(self._off) < len(self.pairs) or not self.pairs:
             return float("nan")
         laws = dict.fromkeys(law for pair in self.pairs for law in pair)
+        # In standard deviations: what the better law would lead by, less the width of its interval.
         needed = -np.log(better) / self.samples.std(axis=1) - self._width
         return float(np.mean([np.mean(self._first(law, needed)) for law in laws]))
 
     def _first(self, law: str, needed: Vector) -> npt.NDArray[np.bool_]:
-        """In which samples (SAMPLES,) a law leads all others, by `needed` (pairs,) deviations."""
+        """In which samples (SAMPLES,) a law would lead all others.
+
+        `needed` (pair,) is by how many standard deviations a pair may deviate against it.
+        """
         sides = [(place, -1 if pair[0] == law else 1) for place, pair in enumerate(self.pairs)]
         own = [(place, side) for place, side in sides if law in self.pairs[place]]
         ahead = [side * self._off[place] > -needed[place] for place, side in own]
@@ -109,6 +116,7 @@ def compare_laws(
             )
     random = np.random.default_rng(seed)
     draws = next(iter(runs.values())).shape[1] if runs else 1
+    # The same draws and training sets in each sample for all laws: they are paired.
     met = random.integers(draws, size=(SAMPLES, draws))
     trained = random.integers(sets, size=(SAMPLES, 1, sets))
     samples = {law: _sample_reached(table, met, trained, random) for law, table in runs.items()}
@@ -119,6 +127,7 @@ def compare_laws(
         spread = np.array([np.log(samples[a]) - np.log(samples[b]) for a, b in pairs])
         spread = spread.reshape(len(pairs), SAMPLES)
         # Drawn with replacement, few training sets scatter less than sets do.
+        # So the spread is widened as a sample variance is, by n / (n - 1).
         few = np.sqrt(sets / (sets - 1)) if sets > 1 else 1.0
         centre = np.where(np.isfinite(ratios), ratios, 0.0)[:, None]
         spread = centre + few * (spread - centre)
@@ -126,7 +135,7 @@ def compare_laws(
 
 
 def ratios(runs: Mapping[str, Vector], level: float, seed: int, *, sets: int = 1) -> pd.DataFrame:
-    """The table of `compare_laws`.
+    """The table of `compare_laws`: a row for each pair, with ratio and interval.
 
     A pair of which a sample is not finite has no interval, unless all samples are infinite on one
     side.
@@ -139,14 +148,15 @@ def _sample_reached(
 ) -> Vector:
     """What a law reaches in each sample of training sets, of its searches, and of the draws.
 
-    `table` is (searches, draws), `met` and `trained` are indices of draws and of training sets.
-    Shape (SAMPLES,).
+    `table` is (searches, draws); `met` (SAMPLES, draws) are indices of draws and `trained`
+    (SAMPLES, 1, sets) those of training sets. Shape (SAMPLES,).
     """
     by_search = np.stack([np.median(runs[met], axis=1) for runs in table], axis=1)
     if len(table) == 1:
         return by_search[:, 0]
     sets = trained.shape[-1]
     repeats = len(table) // sets
+    # Search number r * sets + s is the r-th on training set s.
     which = random.integers(repeats, size=(SAMPLES, repeats, sets)) * sets + trained
     searches = which.reshape(SAMPLES, repeats * sets)
     return np.asarray(np.median(np.take_along_axis(by_search, searches, axis=1), axis=1))
@@ -158,9 +168,10 @@ def _one_sided(ratio: float) -> float:
 
 
 def _ends(ratio: float, spread: Vector, width: float) -> tuple[float, float]:
-    """Interval of a ratio from its logarithm, and the logarithms of single searches (n,).
+    """The interval of a ratio, from its logarithm and those of all samples, `spread` (n,).
 
-    `width` is in standard deviations; without finite numbers it is all or nothing.
+    `width` is half of the interval in standard deviations. Samples that are all infinite to one
+    side leave no doubt; otherwise, infinite samples leave everything open.
     """
     if np.isfinite(spread).all():
         half = width * spread.std()
@@ -171,7 +182,10 @@ def _ends(ratio: float, spread: Vector, width: float) -> tuple[float, float]:
 
 
 def places(pairs: pd.DataFrame, laws: list[str]) -> dict[str, tuple[int, int]]:
-    """The least and the largest rank that each law may have, where its intervals leave it open."""
+    """The least and the largest rank that each law may have, where its intervals leave it open.
+
+    `pairs` are rows of `LawRatios.table` among these laws.
+    """
     ranks = {}
     for law in laws:
         first, second = pairs[pairs.a == law], pairs[pairs.b == law]

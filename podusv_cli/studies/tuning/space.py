@@ -51,9 +51,9 @@ class Gain:
         return number in self.words if self.words else self.low <= number <= self.high
 
     def bound(self, number: Any) -> str:
-        """The end of the range that a value is at, in words; "" where it is at none.
+        """The end of the range that a value is at: `lower`, `upper`, or "" where it is at none.
 
-        The scenario's own value may lie outside.
+        The scenario's own value may lie outside, which is at no end.
         """
         if self.words or not self.low <= number <= self.high or self.high == self.low:
             return ""
@@ -73,7 +73,10 @@ class Gain:
         return (number - self.low) / (self.high - self.low)
 
     def at(self, place: float) -> Any:
-        """What is at a place between the ends, the reverse of `place`; or one of the words."""
+        """The gain at a place between the ends, from 0 to 1, or one of the words.
+
+        It is the reverse of `place`.
+        """
         if self.words:
             return self.words[int(place * len(self.words))]
         if self.log:
@@ -84,7 +87,8 @@ class Gain:
 def gains(law: Controller, label: str, scenario: Scenario, tune: Tune) -> tuple[Gain, ...]:
     """The gains of a law that a search changes, in the order of its fields.
 
-    `scenario` is that of this law alone.
+    `label` is the law's name in the scenario, `scenario` that of this law alone. An entry `law.key`
+    of `tune.space` comes before `key`, and this before the common factor.
     """
     chosen = []
     for key, content in _numbers(law):
@@ -115,10 +119,11 @@ def _numbers(law: Controller) -> Iterator[tuple[str, Any]]:
 
 
 def _is_gain(law: Controller, key: str, scenario: Scenario) -> bool:
-    """Whether a number is a gain: positive, and of a run's numbers, not of its structure."""
+    """Whether a number is a gain: positive, and not one that changes a run's structure."""
     own = getattr(law, key)
     if not isinstance(own, float) or own <= 0.0 or key in law.no_gains:
         return False
+    # Downwards where the number is at its upper limit.
     changed = with_gains(law, {key: own * TRIED}) or with_gains(law, {key: own / TRIED})
     if changed is None:
         return False
@@ -144,7 +149,10 @@ def _of(wanted: float | Range, key: str, own: Any, field: Any) -> list[Gain]:
 
 
 def _around(factor: float, key: str, own: Any, field: Any) -> Gain:
-    """A factor to either side, cut where the field's range ends."""
+    """The range from own / factor to own * factor, cut to the limits of the law's `field`.
+
+    `own` is the scenario's value of the gain `key`, which is positive.
+    """
     low, high = float(own) / factor, float(own) * factor
     ends = limits(field)
     low = max(low, ends.get("ge", low), ends.get("gt", low))
@@ -168,6 +176,7 @@ def space_faults(laws: Mapping[str, Scenario], tune: Tune) -> Iterator[tuple[str
         label, dot, key = name.rpartition(".")
         if name == AROUND or not isinstance(content, Range):
             continue
+        # A name with a dot is one law's; without, it is for all laws.
         named = {label: laws[label]} if dot and label in laws else {} if dot else dict(laws)
         having = {n: single for n, single in named.items() if key in keys(single.controller)}
         if not having:
@@ -193,7 +202,10 @@ def _known_gains(laws: Mapping[str, Scenario]) -> list[str]:
 
 
 def _refusals_of(label: str, scenario: Scenario, key: str, content: Range) -> Iterator[str]:
-    """What is wrong with a range for one law: the values that its scenario does not take."""
+    """What is wrong with a range (`content`) for one law: the values that it does not take.
+
+    `label` is the law's, `scenario` has it as its controller, and `key` is the gain.
+    """
     law = scenario.controller
     own = getattr(law, key)
     if content.keep:
@@ -207,5 +219,6 @@ def _refusals_of(label: str, scenario: Scenario, key: str, content: Range) -> It
         if taken := with_gains(law, {key: tried}):
             other = scenario.model_copy(update={"controller": taken})
             yield from (f"{key} of {label}: {text}" for _, text in of_numbers(other))
+        # The place inside is not the user's number, so a law may refuse it.
         elif tried in ends:
             yield f"{label} does not take {key} = {tried!r}; see podusv explain controller.{key}"

@@ -94,5 +94,6 @@ def _number(number: float | None) -> float:
 def best(trials: Sequence[GainTrial]) -> GainTrial:
     """The finished trial that wins: inequalities first, then the objective, then the earlier."""
     finished = [trial for trial in trials if trial.status == FINISHED]
+    # The first trial is always whole, unless the budget is less than one batch, which is refused.
     least = min(trial.excess for trial in finished)
     return min((t for t in finished if t.excess == least), key=lambda t: t.value)

@@ -27,17 +27,20 @@ def tuned_name(law: str) -> str:
 
 
 def searched_names(law: str, searches: Sequence[Sequence[GainTrial]]) -> list[str]:
-    """The names of a law with the gains that each of its searches found."""
+    """The names in the table of a law with the gains of each of its searches.
+
+    The search whose gains are taken has the name `tuned_name`.
+    """
     names = [f"{law} repeat {number + 1}" for number in range(len(searches))]
     names[choose_search(searches)] = tuned_name(law)
     return names
 
 
 def choose_search(searches: Sequence[Sequence[GainTrial]]) -> int:
-    """Which search found the gains that are taken: it gained most on its training draws.
+    """The number of the search whose gains are taken: it gained most on its training draws.
 
-    That is beside the scenario's own gains on the same draws, its first trial, since searches on
-    other draws have other values. Where those fail, the best value counts.
+    Its value counts relative to the scenario's own gains, its first trial on the same draws, since
+    searches on other draws have other values. Where those fail, the best value counts.
     """
     own = [trials[0].value for trials in searches]
     known = all(map(math.isfinite, own))
@@ -49,7 +52,10 @@ def choose_search(searches: Sequence[Sequence[GainTrial]]) -> int:
 
 
 def contestants(plan: TunePlan, trials: Searched) -> dict[str, Contestant]:
-    """All laws that meet the fresh draws, by name: before, after, and those of other searches."""
+    """All laws that meet the fresh draws, by name: before, after, and those of other searches.
+
+    Each is the name of the scenario's law and its changed numbers.
+    """
     found: dict[str, Contestant] = {}
     for law in plan.laws:
         found[law] = law, {}
@@ -73,16 +79,18 @@ def validate(
     """
     made = plan.variant(contestants(plan, trials), VALIDATE, plan.tune.validate)
     store = Store(folder / FOLDER, record.about(made))
-    _clear(store)
+    _clear_other_runs(store)
     store.open(started)
     dispatch(store, made, tell, executor)
     return store.write_runs()
 
 
-def _clear(store: Store) -> None:
-    """Remove the runs of other gains, which an earlier session with a smaller budget found.
+def _clear_other_runs(store: Store) -> None:
+    """Remove the runs in the folder unless this validation can go on with them.
 
-    study.json goes last, because a folder without it that is not empty is no study.
+    They are of other gains where an earlier session had a smaller budget. More draws than are asked
+    for now cannot be kept either. study.json goes last, because a folder without it that is not
+    empty is no study.
     """
     folder = store.folder
     if not (folder / STUDY).exists():

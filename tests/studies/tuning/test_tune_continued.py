@@ -16,7 +16,7 @@ from podusv_cli.studies.tuning import folder as place
 from podusv_cli.studies.tuning import sampler, trials
 from podusv_cli.studies.tuning.plan import VALIDATE
 from podusv_cli.studies.tuning.trials import FINISHED, GainTrial
-from podusv_cli.studies.tuning.validation import FOLDER, _clear, contestants
+from podusv_cli.studies.tuning.validation import FOLDER, _clear_other_runs, contestants
 from podusv_cli.workflows import tune as workflow
 
 MOST = 40  # calls after which a process is killed at the latest
@@ -120,7 +120,7 @@ def test_runs_of_other_gains_are_replaced_wherever_that_was_killed(tmp_path):
         (earlier.folder / name).write_bytes(b"of other gains")
 
     def begin():
-        _clear(later)
+        _clear_other_runs(later)
         later.open("later")
 
     at_every_call(begin)
