@@ -403,6 +403,16 @@ class Pods(Actuator):
         most = [*speeds, *(pod.angle_limit for pod in self.pods)]
         return {s.name: m for s, m in zip(self.replayed, most, strict=True) if m > 0.0}
 
+    @property
+    def full_speeds(self) -> tuple[tuple[float, float], ...]:
+        """Of every pod the largest n ahead and astern; an angle has none."""
+        return (*(pod.most_n for pod in self.pods), *((0.0, 0.0) for _ in self.pods))
+
+    def with_thrust(self, factor: float, dead_band: float, exponent: float) -> Self | None:
+        """By tables where dead band or exponent bend the curve; None beside a rudder then."""
+        pods = [pod.with_thrust(factor, dead_band, exponent) for pod in self.pods]
+        return None if None in pods else self.changed({"preset": "", "pods": tuple(pods)})
+
     def _each(self, *vectors: Signal) -> tuple[Signal, ...]:
         """The numbers of these vectors as signals of their own, counted from 1."""
         return tuple(
