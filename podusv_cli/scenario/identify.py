@@ -102,7 +102,12 @@ class Identify(Component):
         "own of; null: a tenth of the speed at full thrust; 0: no current",
         ge=0,
     )
-    step: Positive = value(0.05, "s", "longest step of the filter along a log")
+    step: Positive = value(
+        0.05,
+        "s",
+        "longest step of the filter along a log; shorter by itself where the hull's damping asks "
+        "for it",
+    )
     draws: int = value(
         200, "", "hulls that are drawn from what the logs leave open", ge=2, le=10**5
     )

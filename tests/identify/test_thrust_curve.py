@@ -23,7 +23,7 @@ from podusv_cli.identify.doubts import thrust_words
 from podusv_cli.identify.fit.estimate import directions
 from podusv_cli.identify.fit.march import bend_speed
 from podusv_cli.identify.fit.numbers import hull_numbers
-from podusv_cli.identify.fit.problem import FitProblem
+from podusv_cli.identify.fit.problem import WALKS, FitProblem
 from podusv_cli.identify.intake import logs_of
 from podusv_cli.identify.outputs import actuator_keys
 from podusv_cli.scenario.identify import Identify, LogFile
@@ -64,7 +64,7 @@ def test_a_pod_has_the_curve_of_its_definition(part):
     full, gain = (16.0, 0.4) if part > 0.0 else (13.0, 0.25)
     at_full = gain * full**2
     expected = by_definition(part * full, full, at_full)
-    assert thrust_of(bent, part * full) == pytest.approx(expected, abs=4e-4 * at_full)
+    assert thrust_of(bent, part * full) == pytest.approx(expected, abs=1e-3 * at_full)
     assert bent.full_speeds[0] == pytest.approx((16.0, 13.0), rel=1e-12)
 
 
@@ -116,7 +116,7 @@ def otter(tmp_path_factory):
     columns = plain_logs.log_columns(motion, plain_logs.Sensors(), rng)
     path = tmp_path_factory.mktemp("otter") / "otter.csv"
     pd.DataFrame(plain_logs.columns_of(columns, "shaft speeds")).to_csv(path, index=False)
-    scenario = podusv.Scenario(name="otter", **SECTIONS)
+    scenario = podusv.Scenario(name="otter", identify=Identify(logs=LOGS), **SECTIONS)
     numbers, hull = boat.numbers, scenario.vessel
     own = {n: number for n, number in numbers.items() if n[0] in "XYN"}
     own |= {"X_udot": hull.m - numbers["m11"], "Y_vdot": hull.m - numbers["m22"]}
@@ -127,6 +127,7 @@ def otter(tmp_path_factory):
     return known, logs_of(path, LogFile(file=path.name, delay=0.0), known)
 
 
+@pytest.mark.slow
 def test_a_log_determines_the_curve(otter):
     scenario, logs = otter
     given = FitProblem(scenario, Identify(logs=LOGS, free=("thrust_curve",)), logs)
@@ -150,17 +151,18 @@ def test_a_log_determines_the_curve(otter):
         assert thrust_of(answer.actuator, n) == pytest.approx(exact, rel=0.03)
 
 
-def test_with_the_curve_that_is_true_nothing_is_left_to_explain(otter):
-    """The mean square of an innovation over its variance is 1 where all is right."""
+def test_the_curve_that_is_true_explains_a_log_best(otter):
+    """Steps of a tenth away from it, -2 log of the posterior is higher, and without it by far."""
     scenario, logs = otter
     given = FitProblem(scenario, Identify(logs=LOGS, free=("thrust_curve",)), logs)
-    place = {number.name: number for number in given.numbers}
-    y = np.zeros(len(given.numbers))
-    y[0], y[1] = DEAD_BAND / place["dead_band"].sd, math.log(EXPONENT / 2.0) / given.hull[1].sd
-    nu, s = given.innovations([y, np.zeros(len(y))])
-    right, wrong = np.mean(nu * nu / s, axis=0)
-    assert right == pytest.approx(1.0, abs=0.15)
-    assert wrong > 1.5
+    dead, exponent = given.hull
+    calm = [-3.0 * (number.name in WALKS) for number in given.numbers]  # no load wanders
+    points = np.tile(calm, (6, 1))
+    for i, (d, p) in enumerate([(1, 1), (0.9, 1), (1.1, 1), (1, 0.9), (1, 1.1)]):
+        points[i, :2] = d * DEAD_BAND / dead.sd, math.log(p * EXPONENT / 2.0) / exponent.sd
+    true, *beside, without = given.search.values(list(points))
+    assert all(true < value - 3.0 for value in beside)
+    assert true < without - 100.0
 
 
 def test_the_file_of_the_actuator_is_taken_by_a_scenario(tmp_path):
