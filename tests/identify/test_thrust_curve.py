@@ -188,7 +188,7 @@ def test_its_prior_can_be_given():
         logs=LOGS, free=("thrust_curve", "N_r"), priors={"dead_band": 0.03, "thrust_exponent": 0.1}
     )
     dead, exponent, other = hull_numbers(HULL, wanted)
-    assert (dead.prior, dead.sd, dead.least, dead.ratio) == (0.0, 0.03, 0.0, False)
+    assert (dead.prior, dead.sd, dead.ratio) == (0.0, 0.03, False)
     assert (exponent.prior, exponent.ratio) == (2.0, True)
     assert exponent.sd == pytest.approx(0.1, rel=0.01)
     assert other.name == "N_r"

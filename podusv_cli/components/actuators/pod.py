@@ -472,10 +472,8 @@ class Pods(Actuator):
         act(x, state, k, table, tau, thrusts, flows)
         met = allocate(state, demand, flows, k, table, T, tail(command, count))
         met = settings(count, T, flows, k, table, command) and met
-        # What is no number must not get lost between limits.
+        # What is no number must not get lost between limits; a sway force does not in `allocate`.
         lost = 0.0 * (demand[0] + demand[1])
-        if k.takes_sway > 0.0:
-            lost += 0.0 * demand[2]
         for i in range(2 * count):
             command[i] += lost
         signals[SATURATED] = 0.0 if met else 1.0

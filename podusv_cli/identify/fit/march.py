@@ -81,10 +81,11 @@ class Followed(NamedTuple):
 def bend_speed(n: float, ahead: float, astern: float, k: Any) -> float:
     """n at which the actuator's own curve has the thrust of n under dead band and exponent.
 
-    Full n, `ahead` or `astern`, stays.
+    Full n, `ahead` or `astern`, stays, and so does rest.
     """
     full = ahead if n >= 0.0 else astern
-    part = (abs(n) / full - k.dead_band) / (1.0 - k.dead_band) if full > 0.0 else 0.0
+    moves = full > 0.0 and n != 0.0
+    part = (abs(n) / full - k.dead_band) / (1.0 - k.dead_band) if moves else 0.0
     size = full * power(part, 0.5 * k.thrust_exponent) if part > TINY else 0.0
     return size if n >= 0.0 else -size
 

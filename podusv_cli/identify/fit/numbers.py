@@ -19,8 +19,9 @@ from podusv_cli.scenario.identify import DAMPING, GROUPS, THRUST_CURVE, Identify
 ADDED = {"m11": "X_udot", "m22": "Y_vdot", "m23": "Y_rdot", "m32": "N_vdot", "m33": "N_rdot"}
 # Numbers that a force is proportional to; those of the damping.
 FORCES = ("m", "I_z", *(n for n in COEFFICIENTS if n[:2] in DAMPING.values()))
-# Of a thrust curve, before the logs: standard deviations of the dead band, a part of full n that is
-# not below 0, and of the exponent, relative.
+# Of a thrust curve, before the logs: standard deviations of the dead band, a part of full n, and of
+# the exponent, relative. The dead band may end below 0 by its error: a search that is held at 0
+# jumps to and fro there, and cannot say how well 0 is known.
 DEAD, BENT = 0.1, 0.25
 DAMPINGS = tuple(n for n in FORCES[2:] if n not in ADDED.values())
 
@@ -75,7 +76,7 @@ def hull_numbers(vessel: Vessel, wanted: Identify) -> list[FreeNumber]:
 def _free_number(name: str, constants: Mapping[str, float], wanted: Identify) -> FreeNumber:
     """What is known of a number before the logs."""
     if name == DEAD_BAND:
-        return FreeNumber(name, 0.0, wanted.priors.get(name, DEAD), ratio=False, least=0.0)
+        return FreeNumber(name, 0.0, wanted.priors.get(name, DEAD), ratio=False)
     if name == EXPONENT:
         return FreeNumber(name, SQUARE, _log_sd(wanted.priors.get(name, BENT)))
     sd = _log_sd(wanted.priors.get(name, wanted.prior))

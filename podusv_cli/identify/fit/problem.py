@@ -259,7 +259,7 @@ class FitProblem:
     def actuator(self, y: Vector) -> Actuator | None:
         """The actuator with the thrust at a point; None where its kind cannot have that thrust."""
         found = self._hull_values(y)
-        bent = found.get(DEAD_BAND, 0.0), found.get(EXPONENT, SQUARE)
+        bent = max(found.get(DEAD_BAND, 0.0), 0.0), found.get(EXPONENT, SQUARE)
         return self.scenario.actuator.with_thrust(self.thrust(y), *bent)
 
     def _hull_values(self, y: Vector) -> dict[str, float]:
