@@ -29,7 +29,8 @@ class Propeller:
     `top` is its largest speed ahead [1/s]; its speed follows what is asked for with the time
     constant `lag` [s], at most at `rate` [1/s2]. It turns with its axis where `angle_lag` [s] is
     not 0, at most at `angle_rate` [rad/s]; or a rudder does in its stream, whose normal force is
-    `lift` n^2 times its angle, up to the angle `stall` [rad].
+    `lift` n^2 times its angle, up to the angle `stall` [rad]. With a dead band, a part of `top`,
+    or another exponent than 2 its thrust at `top` is the same.
     """
 
     x: float
@@ -43,10 +44,20 @@ class Propeller:
     angle_rate: float = math.inf
     lift: float = 0.0
     stall: float = 0.0
+    dead_band: float = 0.0
+    exponent: float = 2.0
+
+    def thrust(self, n: float) -> float:
+        """Thrust [N] at a speed [1/s]."""
+        gain = self.ahead if n >= 0.0 else self.astern
+        if self.dead_band == 0.0 and self.exponent == 2.0:
+            return gain * abs(n) * n
+        part = max(abs(n) / self.top - self.dead_band, 0.0) / (1.0 - self.dead_band)
+        return math.copysign(gain * self.top**2 * part**self.exponent, n)
 
     def push(self, n: float, angle: float) -> tuple[float, float, float]:
         """Surge force, sway force and yaw moment at a speed [1/s] and an angle [rad]."""
-        T = (self.ahead if n >= 0.0 else self.astern) * abs(n) * n
+        T = self.thrust(n)
         along, across = T * math.cos(angle), T * math.sin(angle)
         if self.lift:
             normal = self.lift * max(n, 0.0) ** 2 * min(max(angle, -self.stall), self.stall)

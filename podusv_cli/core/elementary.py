@@ -61,6 +61,9 @@ A = (
     float.fromhex("0x1.0ad36a455caffp-6"),
 )
 E = tuple(1.0 / math.factorial(n) for n in range(18))  # coefficients of all three series
+O = tuple(1.0 / (2.0 * n + 1.0) for n in range(12))  # and of artanh  # noqa: E741
+SQRT_2 = math.sqrt(2.0)
+FRACTION, ONE = (1 << 52) - 1, 1023 << 52  # bits: of the fraction; of the exponent of 1
 
 
 @kernel
@@ -96,6 +99,35 @@ def exponential(x: float) -> float:
     # The last bits of z are n; in the place of the exponent they make 2^n.
     power = of_bits((bits(z) + 1023) << 52)
     return 0.0 if x < SMALLEST else series * power
+
+
+@kernel
+def logarithm(x: float) -> float:
+    """ln x for a normal number x > 0, to three units in the last place of the larger of it and 1.
+
+    x = 2^n m with m from sqrt(1/2) to sqrt(2); ln m = 2 artanh((m - 1)/(m + 1)) as a series.
+    """
+    n = float((bits(x) >> 52) - 1023)
+    m = of_bits((bits(x) & FRACTION) | ONE)
+    if m > SQRT_2:
+        m = 0.5 * m
+        n = n + 1.0
+    s = (m - 1.0) / (m + 1.0)
+    s2 = s * s
+    s4 = s2 * s2
+    low = _cubic(s2, s4, O[0], O[1], O[2], O[3])
+    middle = _cubic(s2, s4, O[4], O[5], O[6], O[7])
+    high = _cubic(s2, s4, O[8], O[9], O[10], O[11])
+    series = low + s4 * s4 * (middle + s4 * s4 * high)
+    return n * LN2[0] + (2.0 * s * series + n * LN2[1])
+
+
+@kernel
+def power(x: float, exponent: float) -> float:
+    """x^exponent for a normal number x > 0, to 1e-15 times 1 + |exponent ln x|."""
+    y = exponent * logarithm(x)
+    size = exponential(-abs(y))
+    return size if y <= 0.0 else 1.0 / size
 
 
 @kernel

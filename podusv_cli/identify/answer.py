@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from pydantic import ValidationError
 
+from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.components.estimators.ekf import MOVING
 from podusv_cli.components.vessels.envelope import Envelope
 from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
@@ -19,6 +20,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.signal import STATE
 from podusv_cli.identify.fit.estimate import Directions, HullEstimate
+from podusv_cli.identify.fit.march import CURVE, THRUST
 from podusv_cli.identify.fit.problem import FitProblem, channels
 from podusv_cli.identify.fit.records import FilterLog
 from podusv_cli.identify.judge import FreeRun, Score, decisive, predicted_worse
@@ -146,6 +148,15 @@ class Identification:
                 "validity": "the motion of the logs (envelope); posterior.csv has the joint errors",
             }
         )
+
+    @cached_property
+    def actuator(self) -> Actuator | None:
+        """The actuator with the thrust that was found; None if none was looked for or none can be.
+
+        A kind without propellers has no place for it, nor has a rudder for a bent curve.
+        """
+        sought = {number.name for number in self.problem.hull} & {THRUST, *CURVE}
+        return self.problem.actuator(self.estimate.y) if sought else None
 
     @cached_property
     def motion(self) -> Vector:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from podusv_cli.identify.answer import Identification, Whiteness
-from podusv_cli.identify.fit.march import DELAY, THRUST
+from podusv_cli.identify.fit.march import DEAD_BAND, DELAY, EXPONENT, THRUST
 from podusv_cli.identify.judge import predicted_worse
 
 FAR = 3.0  # prior standard deviations, beyond which a number contradicts what was known
@@ -30,6 +30,13 @@ MEANINGS = {
     "sigma": SENSOR,
     **dict.fromkeys(("q_u", "q_v", "q_r"), ACCELERATION),
     **dict.fromkeys(("q_b", "q_b_psi"), LOAD),
+}
+
+
+SOUGHT = {
+    THRUST: "thrust over what the actuator's numbers give is",
+    DEAD_BAND: "dead band of the thrust, a part of full n, is",
+    EXPONENT: "exponent of the thrust over n, 2 being that of the actuator's numbers, is",
 }
 
 
@@ -100,13 +107,22 @@ def worse_words(answer: Identification) -> list[str]:
 
 def thrust_words(answer: Identification) -> list[str]:
     """A sentence where thrust was looked for, since a hull has no place for it."""
-    return [
-        f"thrust is {p.value:.4g} ({p.low:.4g} to {p.high:.4g}) times what the actuator's numbers "
-        "give. The hull is right with that thrust alone. Multiply the actuator's thrust (of pods "
-        f"T_nn, T_nn_astern, T_nV) by {p.value:.4g} where you use this hull or a draw of "
-        "posterior.csv; draws with another thrust are scaled to move as they would under it."
+    said = [
+        f"{SOUGHT[p.name]} {p.value:.4g} ({p.low:.4g} to {p.high:.4g})"
         for p in answer.parameters
-        if p.name == THRUST
+        if p.name in SOUGHT
+    ]
+    if not said:
+        return []
+    use = (
+        "beside it take actuator.yaml, which has that thrust"
+        if answer.actuator
+        else "the actuator's kind has no place for it, so its loads have to be changed likewise"
+    )
+    return [
+        f"{'; '.join(said)}. The hull is right with that thrust alone: {use}. Draws of "
+        "posterior.csv with another factor on the thrust are scaled to move as they would under "
+        "it; none draws another curve."
     ]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -11,17 +12,21 @@ from pathlib import Path
 import numpy as np
 
 from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.earth import PLACE
 from podusv_cli.core.errors import UsageError
+from podusv_cli.core.kernel import bundle
 from podusv_cli.core.signal import STATE
 from podusv_cli.identify.fit.records import FEWEST, POSE, FilterLog, complete, log_of
 from podusv_cli.identify.logs.checks import check_log
 from podusv_cli.identify.logs.commands import with_actuator_state
+from podusv_cli.identify.logs.motion import BinnedMotion
 from podusv_cli.identify.logs.reading import CLOCK, LogTable, NamedQuantities, tables
 from podusv_cli.identify.offsets import Clocks
 from podusv_cli.scenario.identify import LogFile
 from podusv_cli.scenario.model import Scenario
 
+STABLE, QUICK = 0.5, 0.99  # decay of a variance in a step; quantile of the yaw rate for it
 LONG = 3.0  # times a lag, from which on rows of commands are long
 GAP, ROWS = 2.0, 10.0  # s without a row, and usual distances of rows: a gap that ends a piece
 
@@ -38,13 +43,15 @@ def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[FilterLog]:
         NamedQuantities(wanted.columns, wanted.frame, scenario.plane, actuator.scales),
         name=given.name,
     )
-    found = []
+    found, step = list[LogTable](), wanted.step
     for boot in boots if given.span is None else _within(boots, given.span):
         at_rows = with_actuator_state(boot, actuator)
         complete(at_rows, actuator)  # says what is missing before anything else is looked at
         doubts = [*check_log(at_rows, actuator, scenario.facts.U), *_long_rows(boot, actuator)]
         part = replace(boot, warnings=(*boot.warnings, *doubts))
-        found += [with_actuator_state(piece.finer(wanted.step), actuator) for piece in pieces(part)]
+        step = min(step, stable_step(at_rows, scenario.vessel))
+        found += [*pieces(part)]
+    found = [with_actuator_state(piece.finer(step), actuator) for piece in found]
     longest = max(found, key=lambda piece: piece.times[-1] - piece.times[0])
     delay, lines = (
         (given.delay, []) if given.delay is not None else Clocks(scenario, longest).delay()
@@ -53,7 +60,26 @@ def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[FilterLog]:
         lines = [f"{line} A log for judging stays as it is without that." for line in lines]
         delay = 0.0
     found[0] = replace(found[0], warnings=(*found[0].warnings, *lines))
-    return [log_of(piece, actuator, wanted.step, delay) for piece in found]
+    return [log_of(piece, actuator, step, delay) for piece in found]
+
+
+def stable_step(log: LogTable, hull: Vessel) -> float:
+    """The longest step [s] with which RK4 follows the variances of a filter along a log.
+
+    A variance decays twice as fast as the motion that damping brakes, and RK4 lets grow what decays
+    by more than 2.78 in a step (E. Hairer and G. Wanner, "Solving Ordinary Differential Equations
+    II", 2nd ed. 1996, IV.2). By `hull` it decays by STABLE: the boat may brake five times as much.
+    """
+    motion = BinnedMotion(log)
+    known = "r" in log.columns and np.isfinite(log.columns["r"]).any()
+    turns = np.abs(motion.mean("r") if known else motion.rate(motion.heading()))
+    r = float(np.nanquantile(turns, QUICK)) if np.isfinite(turns).any() else 0.0
+    k = bundle(hull.constants())
+    surge = -(k.X_u + 2.0 * k.X_uu * motion.fastest + 3.0 * k.X_uuu * motion.fastest**2) / k.m11
+    sway, yaw = -(k.Y_v + k.Y_rv * r) / k.m22, -(k.N_r + 2.0 * k.N_rr * r) / k.m33
+    coupled = k.m22 * k.m33 / (k.m22 * k.m33 - k.m23 * k.m32)
+    decay = 2.0 * max(surge, coupled * sway, coupled * yaw)
+    return STABLE / decay if decay > 0.0 else math.inf
 
 
 def _long_rows(log: LogTable, actuator: Actuator) -> list[str]:

@@ -9,6 +9,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.core.component import unit_of
 from podusv_cli.core.escaping import visible
@@ -16,7 +17,7 @@ from podusv_cli.core.phrases import value_text
 from podusv_cli.core.recording import Status
 from podusv_cli.identify.answer import AXES, Force, Identification
 from podusv_cli.identify.fit.estimate import OPEN, SILENT
-from podusv_cli.identify.fit.march import COMPASS, CURRENT, DELAY, THRUST
+from podusv_cli.identify.fit.march import COMPASS, CURRENT, CURVE, DELAY, THRUST
 from podusv_cli.identify.fit.wander import DEVIATION, LASTING
 from podusv_cli.identify.judge import WHO, Score
 from podusv_cli.identify.phrases import open_words, summary
@@ -27,8 +28,10 @@ from podusv_cli.scenario.sweep import POSTERIOR
 from podusv_cli.storage import csv_files
 from podusv_cli.storage.run_folder import RunWriter
 
-# Names of the hull and of its draws; under the second ones no scenario takes them by itself.
-WRITTEN, REFUSED = ("identified.yaml", POSTERIOR), ("refused.yaml", f"refused_{POSTERIOR}")
+# Names of the hull, its draws and an actuator whose thrust was looked for; under the second ones no
+# scenario takes them by itself.
+WRITTEN = ("identified.yaml", POSTERIOR, "actuator.yaml")
+REFUSED = ("refused.yaml", f"refused_{POSTERIOR}", "refused_actuator.yaml")
 HEADING = "# A hull that podusv identify found from logs; {} has what these leave open.\n"
 DIGITS = "%.9g"
 UNSETTLED = "not settled"  # in place of whether the logs determine it
@@ -38,7 +41,7 @@ OTHERS = {
     "m11": "kg",
     "m22": "kg",
     "m33": "kg m2",
-    THRUST: "1",
+    **dict.fromkeys((THRUST, *CURVE), "1"),
     DELAY: "s",
     DEVIATION: "m",
     LASTING: "s",
@@ -100,11 +103,13 @@ def write(
 
     A hull with a `refusal` is written under names that no scenario takes by itself.
     """
-    hull, draws = REFUSED if refusal else WRITTEN
+    hull, draws, actuator = REFUSED if refusal else WRITTEN
     said = [refusal] if refusal else []
     heading = "".join(f"# {visible(line)}\n" for line in said) + HEADING.format(draws)
     writer.add("scenario.yaml", text.encode())
     writer.add(hull, (heading + yaml_text(vessel_keys(answer))).encode())
+    if answer.actuator:
+        writer.add(actuator, yaml_text(actuator_keys(answer.actuator)).encode())
     for name, rows in {
         "parameters.csv": [
             {"name": p.name, "unit": unit(answer, p.name), **asdict(p)} for p in answer.parameters
@@ -130,6 +135,12 @@ def vessel_keys(answer: Identification) -> dict[str, Any]:
         for name, content in answer.vessel.model_dump().items()
         if name != "preset" and (fields[name].is_required() or content != fields[name].default)
     }
+
+
+def actuator_keys(actuator: Actuator) -> dict[str, Any]:
+    """The actuator as a preset's file has it."""
+    own = {"kind", "preset", "command", "failure"}  # of the scenario that takes it
+    return actuator.model_dump(exclude=own, exclude_defaults=True)
 
 
 def rows_of_draws(answer: Identification) -> list[dict[str, float]]:

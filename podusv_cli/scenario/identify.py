@@ -17,6 +17,7 @@ WANDER, COMPASS = "wander", "compass"  # m, rad: errors that last; 0 where there
 LASTING = (WANDER, COMPASS)
 COMPASS_OFF = 0.1  # rad, by which a compass may be off
 GROUPS = ("inertia", *(f"damping.{axis}" for axis in DAMPING))
+THRUST_CURVE = "thrust_curve"  # dead band and exponent of the propellers' thrust
 
 
 class LogFile(Component):
@@ -78,7 +79,8 @@ class Identify(Component):
         GROUPS,
         "",
         "numbers of the vessel that are looked for, or groups of them: "
-        f"{', '.join(GROUPS)}; all others stay as the vessel has them",
+        f"{', '.join(GROUPS)}; all others stay as the vessel has them. {THRUST_CURVE}: dead band "
+        "and exponent of the propellers' thrust over n, with its value at full n kept",
         strict=False,
     )
     prior: Positive = value(
@@ -100,7 +102,12 @@ class Identify(Component):
         "own of; null: a tenth of the speed at full thrust; 0: no current",
         ge=0,
     )
-    step: Positive = value(0.05, "s", "longest step of the filter along a log")
+    step: Positive = value(
+        0.05,
+        "s",
+        "longest step of the filter along a log; shorter by itself where the hull's damping asks "
+        "for it",
+    )
     draws: int = value(
         200, "", "hulls that are drawn from what the logs leave open", ge=2, le=10**5
     )

@@ -119,6 +119,9 @@ def test_an_axis_is_logarithmic_where_the_figure_s_is_and_from_the_same_size_on(
     assert panel.get_yaxis().get_transform().linthresh == 1.0
     assert about["v"]["linear"] == 0.1, "four decades below the peak"
     assert about["tau_r"]["linear"] is None, "no peak"
+    brief = recording(v=lambda t: 1e-6 * np.cos(t) + 900.0 * (t == 2.0), end=1000.0)
+    long = {signal["name"]: signal for signal in traces.traces(shown(("a", brief)))["signals"]}
+    assert long["v"]["linear"] == 0.1, "four decades below, where the mean is five"
     assert about["saturated"]["linear"] is None, "a state, no size"
     z_e = panels(drawn("errors", runs))["$z_e$ [m]"]
     assert about["z_e"]["floor"]

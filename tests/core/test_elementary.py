@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 from numba import njit
 
 from podusv_cli.components.disturbances.harmonic import Harmonic, HarmonicDisturbance
-from podusv_cli.core.elementary import arctangent, cos_sin, cos_sin_of_turns, exponential
+from podusv_cli.core.elementary import (
+    arctangent,
+    cos_sin,
+    cos_sin_of_turns,
+    exponential,
+    logarithm,
+    power,
+)
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.kinematics import direction
 from podusv_cli.engine.machine import compile_numba
@@ -37,6 +44,20 @@ def test_the_exponential_ends_in_zero_and_passes_on_what_is_no_number():
     assert exponential(0.0) == 1.0
     assert exponential(-709.0) == exponential(-math.inf) == 0.0
     assert math.isnan(exponential(math.nan))
+
+
+@given(x=st.floats(1e-300, 1e300))
+@example(x=1.0)
+@example(x=math.sqrt(2.0))  # where the power of two changes
+@example(x=math.nextafter(1.0, 0.0))
+@example(x=math.nextafter(1.0, 2.0))
+def test_the_logarithm_is_right_to_three_units(x):
+    assert logarithm(x) == pytest.approx(math.log(x), rel=3 * EPSILON, abs=1e-300)
+
+
+@given(x=st.floats(1e-6, 1e3), exponent=st.floats(-3.0, 3.0))
+def test_a_power_is_that_of_the_library(x, exponent):
+    assert power(x, exponent) == pytest.approx(x**exponent, rel=1e-14)
 
 
 @given(angle=st.floats(-1e6, 1e6))
@@ -88,7 +109,7 @@ def test_a_wave_of_which_no_phase_is_known_is_no_number(turns):
     assert all(math.isnan(number) for number in cos_sin_of_turns(turns))
 
 
-@pytest.mark.parametrize("function", [exponential, cos_sin, cos_sin_of_turns])
+@pytest.mark.parametrize("function", [exponential, logarithm, cos_sin, cos_sin_of_turns])
 def test_machine_code_gives_the_same_bits(function):
     numbers = -np.random.default_rng(3).exponential(20.0, 2000)
     numbers = np.append(numbers, [-1e15, -1e17, -1e308])

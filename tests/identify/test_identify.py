@@ -76,6 +76,7 @@ def test_the_filter_along_a_log_is_that_of_plain_python():
         **HULL.constants(),
         **filter_.constants(),
         "thrust": 0.9,
+        **{"dead_band": 0.0, "thrust_exponent": 2.0},  # of propellers, which are none here
         "delay": delay,
         **dict.fromkeys(("Y_rv", "Y_vr", "N_rv", "N_vr"), 0.0),  # whose slopes are means
         "current_x": current[0],
@@ -350,8 +351,8 @@ def test_thrust_that_is_found_is_said_since_the_hull_has_no_place_for_it(boat):
         found = HullEstimate(y, 0.0, np.eye(size), 1, True)
         lines = thrust_words(Identification(given, found, directions(np.eye(size), 2), (), ()))
         assert len(lines) == count
-    assert lines[0].startswith("thrust is 0.8 (")
-    assert "Multiply the actuator's thrust" in lines[0]
+    assert lines[0].startswith("thrust over what the actuator's numbers give is 0.8 (")
+    assert "its loads have to be changed likewise" in lines[0]  # an ideal actuator has no propeller
 
 
 @pytest.mark.parametrize(("off", "count"), [(-1.5, 1), (-0.1, 0), (0.0, 0), (1.5, 0)])

@@ -34,7 +34,14 @@ from podusv_cli.identify.phrases import summary
 K = {
     **HULL.constants(),
     **ExtendedKalmanFilter(sigma_p=0.03, sigma_u=0.05, sigma_v=0.06, q_u=0.1, q_b=0.2).constants(),
-    **{"thrust": 0.9, "delay": 0.07, "current_x": 0.2, "current_y": -0.1},
+    **{
+        "dead_band": 0.0,
+        "thrust_exponent": 2.0,
+        "thrust": 0.9,
+        "delay": 0.07,
+        "current_x": 0.2,
+        "current_y": -0.1,
+    },
     **{"s_g": 0.4, "T_g": 3.7, "wandering": 1.0, "compass": 0.08},
 }
 

@@ -141,6 +141,19 @@ class Actuator(KernelPart):
         return {}
 
     @property
+    def full_speeds(self) -> tuple[tuple[float, float], ...]:
+        """Of signals `replayed` that are propeller speeds the largest ahead and astern; else 0."""
+        return tuple((0.0, 0.0) for _ in self.replayed)
+
+    def with_thrust(self, factor: float, dead_band: float, exponent: float) -> Self | None:
+        """The actuator with thrust times a factor; None where it has no propellers.
+
+        Thrust at n of full N, over that at N, is ((n/N - dead_band)/(1 - dead_band))^exponent,
+        where it was (n/N)^2, and goes likewise where it was another.
+        """
+        return None
+
+    @property
     def scales(self) -> Scales:
         """Units beside podusv's that signals `replayed` and `lagged` may have, by signal."""
         return {}

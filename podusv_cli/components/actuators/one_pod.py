@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Sequence
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -16,6 +16,7 @@ from podusv_cli.core.component import Component, ValuesOf, value
 from podusv_cli.core.kernel import Vector
 
 ThrustRow = tuple[float, float]  # n, or a pulse [us]; thrust [N]
+STEPS = 40  # of a bent curve, each way
 BY_SQUARE = ("T_nn", "T_nn_astern", "n_max", "n_max_astern")  # keys that a table stands for
 
 
@@ -172,6 +173,54 @@ class Pod(Component):
             return float(self.rows[-1, 1]), float(max(-self.rows[0, 1], 0.0))
         ahead, astern = self.most_n
         return (self.T_nn or 0.0) * ahead * ahead, (self.T_nn_astern or 0.0) * astern * astern
+
+    def with_thrust(self, factor: float, dead_band: float, exponent: float) -> Self | None:
+        """The pod with thrust times a factor and a bent curve, as `Actuator.with_thrust` has it.
+
+        None for a rudder with a bent curve, since its force goes with n^2.
+        """
+        bent = (dead_band, exponent) != (0.0, 2.0)
+        if bent and self.rudder:
+            return None
+        new: dict[str, Any] = {
+            name: factor * number
+            for name in ("T_nn", "T_nn_astern", "T_nV", "T_nV_astern")
+            if (number := getattr(self, name)) is not None
+        }
+        if self.table is not None:
+            new["table_factor"] = factor * self.table_factor
+        if self.rudder:
+            new["rudder"] = self.rudder.changed({"lift": factor * self.rudder.lift})
+        return self.changed(new)._bent(dead_band, exponent) if bent else self.changed(new)
+
+    def _bent(self, dead_band: float, exponent: float) -> Self:
+        """With a table of the bent curve, which straight lines miss by 1e-3 of full thrust.
+
+        A dead band of `pwm` goes into the table.
+        """
+        parts = np.linspace(0.0, 1.0, 1 + STEPS)
+        sides = []
+        for way, full in zip((1.0, -1.0), self.most_n, strict=True):
+            n = way * full * (dead_band + (1.0 - dead_band) * parts)
+            thrusts = [self._thrust_at_rest(way * full * s) for s in parts ** (0.5 * exponent)]
+            sides.append(np.column_stack([n, thrusts]))
+        ahead, astern = sides
+        rows = np.concatenate([astern[:0:-1], [[0.0, 0.0]], ahead[1:]])
+        if dead_band > 0.0:
+            rows = np.concatenate([astern[::-1], [[0.0, 0.0]], ahead])
+        rows = rows[np.append(True, np.diff(rows[:, 0]) > 0.0)]  # without n astern rest comes once
+        given = dict.fromkeys(BY_SQUARE) | {"table": tuple(map(tuple, rows.tolist()))}
+        still = {"pwm": self.pwm.changed({"dead_band": None})} if self.pwm else {}
+        return self.changed({**given, **still, "table_in": "n", "table_factor": 1.0})
+
+    def _thrust_at_rest(self, n: float) -> float:
+        """Thrust [N] at n, of a vessel that lies still."""
+        if self.table is not None:
+            return float(np.interp(n, *self.rows.T))
+        ahead, astern, stretch, stretch_astern = self._dead_band()
+        if n >= 0.0:
+            return (self.T_nn or 0.0) * (max(n - ahead, 0.0) * stretch) ** 2
+        return -(self.T_nn_astern or 0.0) * (max(-n - astern, 0.0) * stretch_astern) ** 2
 
     def curves(self) -> list[Vector]:
         """The table ahead and astern as `thrust_curve` has them; without a table none."""

@@ -403,6 +403,16 @@ class Pods(Actuator):
         most = [*speeds, *(pod.angle_limit for pod in self.pods)]
         return {s.name: m for s, m in zip(self.replayed, most, strict=True) if m > 0.0}
 
+    @property
+    def full_speeds(self) -> tuple[tuple[float, float], ...]:
+        """Of every pod the largest n ahead and astern; an angle has none."""
+        return (*(pod.most_n for pod in self.pods), *((0.0, 0.0) for _ in self.pods))
+
+    def with_thrust(self, factor: float, dead_band: float, exponent: float) -> Self | None:
+        """By tables where dead band or exponent bend the curve; None beside a rudder then."""
+        pods = [pod.with_thrust(factor, dead_band, exponent) for pod in self.pods]
+        return None if None in pods else self.changed({"preset": "", "pods": tuple(pods)})
+
     def _each(self, *vectors: Signal) -> tuple[Signal, ...]:
         """The numbers of these vectors as signals of their own, counted from 1."""
         return tuple(
@@ -462,10 +472,8 @@ class Pods(Actuator):
         act(x, state, k, table, tau, thrusts, flows)
         met = allocate(state, demand, flows, k, table, T, tail(command, count))
         met = settings(count, T, flows, k, table, command) and met
-        # What is no number must not get lost between limits.
+        # What is no number must not get lost between limits; a sway force does not in `allocate`.
         lost = 0.0 * (demand[0] + demand[1])
-        if k.takes_sway > 0.0:
-            lost += 0.0 * demand[2]
         for i in range(2 * count):
             command[i] += lost
         signals[SATURATED] = 0.0 if met else 1.0

@@ -20,7 +20,7 @@ from podusv_cli.components.estimators.ekf import (
     take_in,
 )
 from podusv_cli.components.vessels.vessel import COEFFICIENTS
-from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.elementary import cos_sin, power
 from podusv_cli.core.kernel import LANES, Vector, kernel, scratch, tail, unpacker
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.engine.machine import signatures
@@ -37,13 +37,22 @@ MOST_COMMANDS = 32  # of a row
 # mean over the row as it acts so many times APART [s] later.
 HOLDS, DELIVERED, VALUES, COMMANDS = 0, 1, 1 + MOVING, 1 + 2 * MOVING
 SHIFTS, APART = (-1.0, 0.0, 1.0), 0.1
+TINY = 1e-12  # of full n: no thrust
 SIGMAS = ("sigma_p", "sigma_p", "sigma_psi", "sigma_u", "sigma_v", "sigma_r")
 CURRENT = ("current_x", "current_y")  # m/s: how fast the water flows north and east
 DELAY = "delay"  # s: how much later than the log says its commands act
 THRUST = "thrust"  # what part of the loads that the actuator's numbers give acts on the hull
 COMPASS = "compass"  # rad: by how much more than the heading it shows
 SENSED = (DEVIATION, LASTING, ASKED, COMPASS)
-NAMES = (*COEFFICIENTS, *ExtendedKalmanFilter().constants(), THRUST, DELAY, *CURRENT, *SENSED)
+# Thrust T of a propeller at n of its full N, over that at N: ((n/N - dead_band)/(1 - dead_band)) to
+# the power thrust_exponent, and 0 within the dead band.
+DEAD_BAND, EXPONENT = "dead_band", "thrust_exponent"
+CURVE = (DEAD_BAND, EXPONENT)
+SQUARE = 2.0  # the exponent under which a propeller's thrust is as the actuator's numbers give it
+NAMES = (
+    *(*COEFFICIENTS, *ExtendedKalmanFilter().constants()),
+    *(THRUST, *CURVE, DELAY, *CURRENT, *SENSED),
+)
 named = unpacker(NAMES)
 
 
@@ -66,6 +75,19 @@ class Followed(NamedTuple):
     innovations: Vector
     variances: Vector
     track: Vector
+
+
+@kernel
+def bend_speed(n: float, ahead: float, astern: float, k: Any) -> float:
+    """n at which the actuator's own curve has the thrust of n under dead band and exponent.
+
+    Full n, `ahead` or `astern`, stays, and so does rest.
+    """
+    full = ahead if n >= 0.0 else astern
+    moves = full > 0.0 and n != 0.0
+    part = (abs(n) / full - k.dead_band) / (1.0 - k.dead_band) if moves else 0.0
+    size = full * power(part, 0.5 * k.thrust_exponent) if part > TINY else 0.0
+    return size if n >= 0.0 else -size
 
 
 @kernel
@@ -125,6 +147,7 @@ def filter_rows(
     apart: int,
     size: int,
     record: Vector,
+    full: Vector,
     actuator: Vector,
     table: Vector,
     p: Vector,
@@ -135,7 +158,8 @@ def filter_rows(
     """The filter along the rows of a record: classical RK4 between them, with commands held.
 
     Rows of the track are so far `apart`; with 0 the last one alone is left. `size` are the numbers
-    of the state that are used: with the error of positions all of them.
+    of the state that are used: with the error of positions all of them. `full` has the full n of
+    each command ahead and astern; 0 ahead for what is not bent.
     """
     k = named(p)
     tau, y, stages, commands = scratch(3), scratch(SIZE), scratch(STAGES), scratch(MOST_COMMANDS)
@@ -153,6 +177,8 @@ def filter_rows(
             shifts = tail(line, COMMANDS + 3 * i)
             commands[i] = shifts[1] + 0.5 * late * (shifts[2] - shifts[0])
             commands[i] += 0.5 * late * late * (shifts[2] - 2.0 * shifts[1] + shifts[0])
+            if full[2 * i] > 0.0:
+                commands[i] = bend_speed(commands[i], full[2 * i], full[2 * i + 1], k)
         h = line[HOLDS]
         since += h
         shift_state(size, state, 0.0, state, y)
@@ -168,12 +194,12 @@ def filter_rows(
             state[i] += h / 6.0 * (stages[i] + 2.0 * between + stages[3 * SIZE + i])
 
 
-FILTERED = (PROTOTYPES["actuator"], PROTOTYPES["follow"], *[WHOLE] * 4, *[PLAIN] * 7)
+FILTERED = (PROTOTYPES["actuator"], PROTOTYPES["follow"], *[WHOLE] * 4, *[PLAIN] * 8)
 FILTERED_LANES = (
     LANE_PROTOTYPES["actuator"],
     LANE_PROTOTYPES["follow"],
     *[WHOLE] * 4,
-    PLAIN,
+    *[PLAIN] * 2,
     *[LANE_VECTOR] * 6,
 )
 
@@ -193,8 +219,10 @@ def pieces(actuator: Actuator) -> list[Any]:
     ]
 
 
-def side_by_side(actuator: Actuator) -> Follow:
+def side_by_side(actuator: Actuator, *, bent: bool = False) -> Follow:
     """A function that follows a record with several constants and starts, in compiled code.
+
+    `bent`: propellers go by dead band and exponent of the constants.
 
     Of each run it takes the constants, in the order of `NAMES`, and the filter's state at the
     start; then whether their tracks are wanted. Raises LawError, and TypeError where the actuator's
@@ -207,6 +235,7 @@ def side_by_side(actuator: Actuator) -> Follow:
     loads, follow, march = map(compile.routine, compiled)
     a = _in_lanes([np.array([*actuator.constants().values(), 0.0])])
     table = _in_lanes([actuator.table()])
+    full = np.array(actuator.full_speeds) * float(bent)
 
     def follow_wide(
         record: FilterRecord, constants: Sequence[Vector], starts: Sequence[Vector], tracked: bool
@@ -224,6 +253,7 @@ def side_by_side(actuator: Actuator) -> Follow:
             apart,
             SIZE if constants[0][NAMES.index(ASKED)] else wander.PLAIN,
             signatures.pointer(record.rows),
+            signatures.pointer(full),
             *[signatures.pointer(v, LANE_VECTOR) for v in (a, table, p, state, out, track)],
         )
         runs = len(constants)

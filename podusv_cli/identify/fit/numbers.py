@@ -12,13 +12,17 @@ import numpy as np
 from podusv_cli.components.vessels.vessel import COEFFICIENTS, INERTIA, Vessel
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
-from podusv_cli.identify.fit.march import THRUST
-from podusv_cli.scenario.identify import DAMPING, GROUPS, Identify
+from podusv_cli.identify.fit.march import CURVE, DEAD_BAND, EXPONENT, SQUARE, THRUST
+from podusv_cli.scenario.identify import DAMPING, GROUPS, THRUST_CURVE, Identify
 
 # Where an entry of the mass matrix is, and what of it stands beside the added mass.
 ADDED = {"m11": "X_udot", "m22": "Y_vdot", "m23": "Y_rdot", "m32": "N_vdot", "m33": "N_rdot"}
 # Numbers that a force is proportional to; those of the damping.
 FORCES = ("m", "I_z", *(n for n in COEFFICIENTS if n[:2] in DAMPING.values()))
+# Of a thrust curve, before the logs: standard deviations of the dead band, a part of full n, and of
+# the exponent, relative. The dead band may end below 0 by its error: a search that is held at 0
+# jumps to and fro there, and cannot say how well 0 is known.
+DEAD, BENT = 0.1, 0.25
 DAMPINGS = tuple(n for n in FORCES[2:] if n not in ADDED.values())
 
 
@@ -66,10 +70,17 @@ def hull_numbers(vessel: Vessel, wanted: Identify) -> list[FreeNumber]:
         raise UsageError(
             f"identify.priors: {unknown[0]} is not looked for; looked for: {', '.join(names)}"
         )
-    return [
-        FreeNumber(n, constants.get(n, 1.0), _log_sd(wanted.priors.get(n, wanted.prior)))
-        for n in names
-    ]
+    return [_free_number(n, constants, wanted) for n in names]
+
+
+def _free_number(name: str, constants: Mapping[str, float], wanted: Identify) -> FreeNumber:
+    """What is known of a number before the logs."""
+    if name == DEAD_BAND:
+        return FreeNumber(name, 0.0, wanted.priors.get(name, DEAD), ratio=False)
+    if name == EXPONENT:
+        return FreeNumber(name, SQUARE, _log_sd(wanted.priors.get(name, BENT)))
+    sd = _log_sd(wanted.priors.get(name, wanted.prior))
+    return FreeNumber(name, constants.get(name, 1.0), sd)
 
 
 def _members(name: str, constants: Mapping[str, float]) -> list[str]:
@@ -78,15 +89,17 @@ def _members(name: str, constants: Mapping[str, float]) -> list[str]:
         f"damping.{axis}": tuple(n for n in DAMPINGS if n.startswith(first))
         for axis, first in DAMPING.items()
     }
+    if name == THRUST_CURVE:
+        return [*CURVE]
     if name in group:
         return [n for n in group[name] if constants[n] != 0.0]
-    alone = {*INERTIA, THRUST, *(n for members in group.values() for n in members)}
+    alone = {*INERTIA, THRUST, *CURVE, *(n for members in group.values() for n in members)}
     if name not in alone:
-        near = difflib.get_close_matches(name, [*GROUPS, *alone], 1)
+        near = difflib.get_close_matches(name, [*GROUPS, THRUST_CURVE, *alone], 1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         raise UsageError(
-            f"identify.free: {name!r} is no group ({', '.join(GROUPS)}) and no number of the "
-            f"vessel ({', '.join(sorted(alone))}){hint}"
+            f"identify.free: {name!r} is no group ({', '.join((*GROUPS, THRUST_CURVE))}) and no "
+            f"number of the vessel ({', '.join(sorted(alone))}){hint}"
         )
     if name == "m32" and symmetric(constants):
         return ["m23"]

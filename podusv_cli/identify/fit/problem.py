@@ -11,18 +11,24 @@ from typing import TypeVar
 
 import numpy as np
 
+from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.components.estimators.ekf import MOVING, PACKED, ExtendedKalmanFilter, N
 from podusv_cli.components.facts import Facts
 from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import LANES, Vector
 from podusv_cli.identify.fit.estimate import HullSearch
 from podusv_cli.identify.fit.march import (
     COMPASS,
     CURRENT,
+    CURVE,
+    DEAD_BAND,
     DELAY,
     DELIVERED,
+    EXPONENT,
     NAMES,
     SIGMAS,
+    SQUARE,
     THRUST,
     Follow,
     Followed,
@@ -41,7 +47,7 @@ from podusv_cli.identify.fit.sensing import USUAL, Wandering, position_wandering
 from podusv_cli.identify.fit.wander import ASKED, DEVIATION, LASTING, OWN, PLAIN, SIZE
 from podusv_cli.identify.logs.reading import Whole
 from podusv_cli.process.workers import available_workers
-from podusv_cli.scenario.identify import COMPASS_OFF, WANDER, Identify
+from podusv_cli.scenario.identify import COMPASS_OFF, THRUST_CURVE, WANDER, Identify
 from podusv_cli.scenario.model import Scenario
 
 Entry = TypeVar("Entry")
@@ -120,8 +126,22 @@ class FitProblem:
 
     @cached_property
     def hull(self) -> list[FreeNumber]:
-        """The hull's numbers that are looked for."""
-        return hull_numbers(self.scenario.vessel, self.wanted)
+        """The hull's numbers that are looked for, and those of the thrust.
+
+        Raises UsageError for the thrust curve of an actuator without propellers.
+        """
+        actuator, numbers = self.scenario.actuator, hull_numbers(self.scenario.vessel, self.wanted)
+        if {n.name for n in numbers} & {*CURVE} and not np.any(actuator.full_speeds):
+            raise UsageError(
+                f"identify.free: {THRUST_CURVE} is that of propellers, and {actuator.label} has "
+                "none; leave it out, or choose the actuator whose propeller speeds the logs have"
+            )
+        return numbers
+
+    @property
+    def _curved(self) -> bool:
+        """Whether dead band and exponent of the thrust are looked for."""
+        return any(number.name in CURVE for number in self.hull)
 
     @cached_property
     def numbers(self) -> list[FreeNumber]:
@@ -162,7 +182,8 @@ class FitProblem:
     @cached_property
     def _fixed_constants(self) -> Vector:
         """The filter's constants before anything is looked for, in the order of `NAMES`."""
-        still = {THRUST: 1.0, **dict.fromkeys((DELAY, COMPASS, *CURRENT), 0.0)}
+        still = {THRUST: 1.0, EXPONENT: SQUARE}
+        still |= dict.fromkeys((DEAD_BAND, DELAY, COMPASS, *CURRENT), 0.0)
         still |= {ASKED: float(self.wander > 0.0), DEVIATION: self.wander, LASTING: USUAL}
         known = self.scenario.vessel.constants() | self.filter.constants() | still
         return np.array([known[name] for name in NAMES])
@@ -213,7 +234,7 @@ class FitProblem:
         """The hull at a point. Raises ValidationError where no hull can be like that."""
         own = self.scenario.vessel
         new = self._with_m32(self._hull_values(y))
-        new.pop(THRUST, None)
+        new = {name: number for name, number in new.items() if name not in (THRUST, *CURVE)}
         beside = {n: getattr(own, n) + getattr(own, ADDED[n]) for n in ADDED}
         added = {ADDED[n]: beside[n] - new.pop(n) for n in ADDED if n in new}
         return own.changed(new | added)
@@ -235,6 +256,12 @@ class FitProblem:
         """What part of the loads that the actuator's numbers give acts on the hull at a point."""
         return self._hull_values(y).get(THRUST, 1.0)
 
+    def actuator(self, y: Vector) -> Actuator | None:
+        """The actuator with the thrust at a point; None where its kind cannot have that thrust."""
+        found = self._hull_values(y)
+        bent = max(found.get(DEAD_BAND, 0.0), 0.0), found.get(EXPONENT, SQUARE)
+        return self.scenario.actuator.with_thrust(self.thrust(y), *bent)
+
     def _hull_values(self, y: Vector) -> dict[str, float]:
         values = values_at(self.hull, y[: len(self.hull)]).tolist()
         return {number.name: value for number, value in zip(self.hull, values, strict=True)}
@@ -249,7 +276,7 @@ class FitProblem:
 
     @cached_property
     def _follow(self) -> Follow:
-        return side_by_side(self.scenario.actuator)
+        return side_by_side(self.scenario.actuator, bent=self._curved)
 
     def start(
         self, log: FilterLog, current: Sequence[float], values: Vector, *, first_known: bool = True

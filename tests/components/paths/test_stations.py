@@ -61,16 +61,16 @@ def test_a_station_is_left_once_it_was_kept_for_the_time_asked_for(changes):
 
 
 def test_metrics_end_with_the_last_station():
-    over = ("simulation.duration=36.0", "metrics.steady_fraction=0.25", "start.x=0.4")
+    over = ("simulation.duration=60.0", "metrics.steady_fraction=0.25", "start.x=1.5")
     run = podusv.simulate(loaded_pose(BOAT + PATH + LAW, LONG, *over))
     rows = walked(run)
     end = int(np.argmax(rows[:, 0] == 4))
-    assert run.metrics["path_time"] == run["time"][end] < 36.0
+    assert run.metrics["path_time"] == run["time"][end] < 60.0
     assert run.metrics["path_done"] == 1.0
     z = run["z_e"][: end + 1]
     assert run.metrics["iae"] == pytest.approx(np.trapezoid(z, dx=0.02), rel=1e-9)
     late = int(np.argmax(rows[:, 0] == 3))  # three of four
-    assert run["time"][late] < 26.0  # before the last quarter of the time began
+    assert run["time"][late] > 0.75 * 60.0  # the window by time has begun, and begins anew
     span = slice(late, end + 1)
     mean = np.trapezoid(run["z_e"][span], dx=0.02) / (run["time"][end] - run["time"][late])
     assert run.metrics["z_e_steady"] == pytest.approx(mean, rel=1e-9)
