@@ -128,11 +128,12 @@ def keys(context: typer.Context, incomplete: str) -> Offered:
     """
     from pathlib import Path
 
-    # A word before an option without its value is not yet an argument.
+    # The scenario is `config`, or one of the `items` of a comparison. A word before an option
+    # without its value is not yet an argument, and stands in `args`.
     named = [context.params.get("config"), *(context.params.get("items") or ()), *context.args]
     for name in filter(None, named):
         if name.startswith("podusv:") or Path(name).is_file():
-            with suppress(Exception):  # there is no place for a message
+            with suppress(Exception):  # there is no place for a message: the next file, or all keys
                 return _beginning(incomplete, _keys_in(name, _plugins(context) or ()))
     return all_keys(context, incomplete)
 

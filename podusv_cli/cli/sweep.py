@@ -136,13 +136,13 @@ def _tell(done: Swept, *, as_json: bool, quiet: bool) -> None:
 def _report(done: Swept) -> None:
     """Print how many runs are made, and of a study with results its table and verdicts."""
     if done.results is None:
-        echo(f"{done.tally.made} of {done.tally.wanted} runs are made; {_next(done)}")
+        echo(f"{done.tally.made} of {done.tally.wanted} runs are made; {_next_step(done)}")
         for line in done.missing_runs:
             echo(line)
         echo(f"study: {done.folder}")
         return
     if done.results.preliminary:
-        echo(f"{done.results.preliminary}; {_next(done)}")
+        echo(f"{done.results.preliminary}; {_next_step(done)}")
     echo_table(*done.results.cells())
     for v in done.results.verdicts:
         echo_entry(v.name, v.claim.says, v.evidence(), facts=v.in_words)
@@ -155,7 +155,7 @@ def _report(done: Swept) -> None:
         echo(f"report: {done.folder / 'report.html'}")
 
 
-def _next(done: Swept) -> str:
+def _next_step(done: Swept) -> str:
     """What to do next with an unfinished study, in words: join its shards, or continue it."""
     if done.part_is_whole:
         return "this shard is done: join all of them with podusv sweep merge"

@@ -213,6 +213,7 @@ class Warnings:
 def _group_findings(findings: Sequence[Finding], labels: Sequence[str]) -> Iterator[Finding]:
     """One finding of each kind and key, with all its runs and the sentence of the first.
 
+    A finding that is alone of its kind and key, and those about the scenario, are passed on singly.
     `labels` are those of all runs.
     """
     alike: dict[tuple[str, str], list[Finding]] = {}
@@ -225,5 +226,5 @@ def _group_findings(findings: Sequence[Finding], labels: Sequence[str]) -> Itera
             continue
         runs = tuple(dict.fromkeys(run for finding in (first, *others) for run in finding.runs))
         text = f"in {first.runs[0]}, {first.text}; -v shows it for each"
-        everywhere = len(runs) == len(labels) > 2
+        everywhere = len(runs) == len(labels) > 2  # two names are as short as "all 2 runs"
         yield replace(first, text=text, runs=(f"all {len(runs)} runs",) if everywhere else runs)

@@ -229,7 +229,9 @@ def _metrics_without_best(
     Larger margins are better, and the least number is marked.
     """
     both = zip(frame.rows.get("iae", ()), frame.rows.get("iae_e", ()), strict=False)
-    standoff = any(iae > beyond for iae, beyond in both)
+    # iae integrates |z_e|, iae_e |z_e - standoff|: without a standoff they have the same bits. Of a
+    # law that stays within half its standoff iae_e is larger. NaN is neither above nor below.
+    standoff = any(iae < iae_e or iae > iae_e for iae, iae_e in both)
     return [
         name
         for name in frame.rows

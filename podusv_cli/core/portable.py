@@ -144,7 +144,8 @@ def _cubic(x: Vector, c: tuple[float, ...]) -> Vector:
 def total(terms: Vector) -> Vector:
     """The sum over the first axis of terms (n, ...), shape (...), by halves.
 
-    The order of the additions is fixed; rounding errors grow with log n.
+    The order of the additions is fixed; rounding errors grow with log n. For n = 1 it is a view of
+    `terms`: copy it before you write into it.
     """
     terms = np.asarray(terms)
     while len(terms) > 1:

@@ -151,20 +151,21 @@ def _answer(verdict: Verdict, tried: Tried) -> DoubtAnswer:
     failed = sum(bool(world.failed) for world in worlds)
     number, spread = _nearest(verdict, base, worlds)
     return DoubtAnswer(
-        verdict,
-        tuple(t for t in turns if not t.choice.task),
-        tuple(t for t in turns if t.choice.task),
-        tuple(explain_turns(tried.draws, turned, known, acting)),
-        int((known & ~turned).sum()),
-        int(turned.sum()),
-        int((~known).sum()) - failed,
-        failed,
-        len(moved),
-        sum(acting[alone.choice.name] for alone in moved),
-        sum(alone.silences(claim) for alone in moved if not alone.choice.task),
-        base.numbers[claim],
-        number,
-        spread,
+        verdict=verdict,
+        turns=tuple(t for t in turns if not t.choice.task),
+        neighbours=tuple(t for t in turns if t.choice.task),
+        explained=tuple(explain_turns(tried.draws, turned, known, acting)),
+        kept=int((known & ~turned).sum()),
+        turned=int(turned.sum()),
+        # A world that failed has no answer either; it is counted apart.
+        unknown=int((~known).sum()) - failed,
+        failed=failed,
+        tried=len(moved),
+        acted=sum(acting[alone.choice.name] for alone in moved),
+        silent=sum(alone.silences(claim) for alone in moved if not alone.choice.task),
+        numbers=base.numbers[claim],
+        number=number,
+        spread=spread,
     )
 
 

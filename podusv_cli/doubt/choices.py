@@ -110,7 +110,11 @@ def choices(singles: Singles, doubt: Doubt | None = None) -> list[Choice]:
 
 
 def hulls(singles: Singles, doubt: Doubt) -> Iterator[Choice]:
-    """The choice of a whole hull, by the presets that `doubt.hulls` names; none without any."""
+    """The choice of a whole hull, by the presets that `doubt.hulls` names.
+
+    There is none where it names no other than the scenario's own. `singles` are the laws' scenarios
+    by label; all have the vessel of the comparison, so the first one tells its preset.
+    """
     first = next(iter(singles.values())).vessel.preset
     others = tuple(hull for hull in doubt.hulls if hull != first)
     if others:

@@ -70,7 +70,7 @@ def _frames(runs: Sequence[Shown]) -> Iterator[Image.Image]:
         figure = Page(figsize=SIZE, dpi=DPI)
         canvas = FigureCanvasAgg(figure)
         whole, near = figure.subplots(1, 2)
-        moves = [stage(whole, runs), stage(near, runs, near=True)]
+        moves = [draw_scene(whole, runs), draw_scene(near, runs, near=True)]
         legend(figure)
         for t in frame_times(runs):
             for move in moves:
@@ -112,11 +112,11 @@ def frame_times(runs: Sequence[Shown]) -> list[float]:
     ]
 
 
-def stage(axes: Axes, runs: Sequence[Shown], *, near: bool = False) -> Callable[[float], None]:
+def draw_scene(axes: Axes, runs: Sequence[Shown], *, near: bool = False) -> Callable[[float], None]:
     """Draw what stands still on `axes`, and return a function that moves the rest to a time [s].
 
     A run that has ended stays where it is, its hull pale. With `near`, the map goes with the first
-    target, or the first run where there is none, and hulls are to scale.
+    moving target, or the first run where there is none, and hulls are to scale.
     """
     chased = [
         (
@@ -144,6 +144,7 @@ def stage(axes: Axes, runs: Sequence[Shown], *, near: bool = False) -> Callable[
         if near:
             row = min(int(np.searchsorted(followed["time"], t)), len(followed["time"]) - 1)
             east, north = (float(followed[name][row]) for name in place)
+            # `auto=None`: equal scales may widen these limits; of fixed ones matplotlib would warn.
             axes.set_xlim(east - reach, east + reach, auto=None)
             axes.set_ylim(north - reach, north + reach, auto=None)
         words = "hulls to scale" if near else f"hulls {scale:.0f} times as large"

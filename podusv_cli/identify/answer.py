@@ -23,7 +23,7 @@ from podusv_cli.identify.fit.estimate import Directions, HullEstimate
 from podusv_cli.identify.fit.march import CURVE, THRUST
 from podusv_cli.identify.fit.problem import FitProblem, channels
 from podusv_cli.identify.fit.records import FilterLog
-from podusv_cli.identify.judge import FreeRun, Score, decisive, predicted_worse
+from podusv_cli.identify.judge import FreeRun, Score, decisive, scores_worse_than_prior
 
 SIDE = 1.959964  # standard deviations to either end of an interval that holds 95 %
 SLOWEST = 0.05  # of the largest speed along the logs: slower is no motion to speak of
@@ -133,7 +133,7 @@ class Identification:
     def refused_by(self) -> list[tuple[Score, Score]]:
         """Where the prior predicts better, so that the hull is none to use: own score, prior's."""
         both_axes = math.sqrt(2.0) * self.problem.position_noise(self.estimate.y)
-        return predicted_worse(decisive(self.scores), both_axes)
+        return scores_worse_than_prior(decisive(self.scores), both_axes)
 
     @cached_property
     def vessel(self) -> Vessel:

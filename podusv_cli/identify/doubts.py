@@ -6,7 +6,7 @@ import math
 
 from podusv_cli.identify.answer import Identification, Whiteness
 from podusv_cli.identify.fit.march import DEAD_BAND, DELAY, EXPONENT, THRUST
-from podusv_cli.identify.judge import predicted_worse
+from podusv_cli.identify.judge import scores_worse_than_prior
 
 FAR = 3.0  # prior standard deviations, beyond which a number contradicts what was known
 LARGE = 2.0  # prior standard deviations, beyond which a noise or a walk has taken up something else
@@ -97,7 +97,7 @@ def _is_alike(w: Whiteness) -> bool:
 
 def worse_words(answer: Identification) -> list[str]:
     """A sentence for each log that was not fitted and that the prior predicts better."""
-    worse = predicted_worse([s for s in answer.scores if s.role == "judge"])
+    worse = scores_worse_than_prior([s for s in answer.scores if s.role == "judge"])
     return [
         f"{name}: the vessel as it was given predicts this log better than the one from the logs; "
         "do not take that one before you know why (the logs determine too little, or disagree)"

@@ -162,10 +162,13 @@ def scores(log: FilterLog, role: str, runs: Sequence[FreeRun]) -> Iterator[Score
                 yield Score(log.name, role, horizon, who, len(own), position, heading)
 
 
-def predicted_worse(scores: Sequence[Score], noise: float = 0.0) -> list[tuple[Score, Score]]:
-    """Scores of the hull from the logs that are worse than the prior's, each beside that one.
+def scores_worse_than_prior(
+    scores: Sequence[Score], noise: float = 0.0
+) -> list[tuple[Score, Score]]:
+    """Scores of the hull from the logs whose position error is more than WORSE times the prior's.
 
-    An error that the positions' own `noise` [m] explains is not worse than another.
+    Each stands beside the prior's score. An error that the positions' own `noise` [m] explains is
+    not worse than another.
     """
     own, prior = ([s for s in scores if s.who == who] for who in WHO[:2])
     return [

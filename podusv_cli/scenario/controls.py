@@ -115,7 +115,7 @@ def _of_part(scenario: Scenario, part: str, at: Route, ruled: set[Route]) -> Ite
         elif found := _control(scenario, part, (*at, name), key.keys[name], content):
             yield Knob(**found, by_rule=(*at, name) in ruled)
         elif (*at, name) == PLACES and 0 < len(content or ()) <= MOST_PLACES:
-            yield from _of_waypoints((*at, name), content)
+            yield from _waypoint_knobs((*at, name), content)
         # An actuator without the section `command` has no delay yet, and may be given one.
         elif name == LINK[0] and part == "actuator" and content is None:
             delay = key.keys[name].keys[LINK[1]]
@@ -123,7 +123,7 @@ def _of_part(scenario: Scenario, part: str, at: Route, ruled: set[Route]) -> Ite
                 yield Knob(**found)
 
 
-def _of_waypoints(at: Route, points: Sequence[Sequence[float]]) -> Iterator[Knob]:
+def _waypoint_knobs(at: Route, points: Sequence[Sequence[float]]) -> Iterator[Knob]:
     """A knob for north and for east [m] of each point, which reaches as far as the points extend.
 
     `points` are (n, 2), `at` the steps to the list.

@@ -58,12 +58,13 @@ def preset_names(presets: Presets, plugins: Plugins = ()) -> tuple[str, ...]:
     return tuple(_preset_files(presets, plugins))
 
 
-def preset_file(
+def preset_values(
     presets: Presets, name: str, faults: list[Fault], plugins: Plugins = ()
 ) -> Node | None:
     """The values of a preset by its name, one of `preset_names`; None if its file is no YAML.
 
-    What is wrong with it is appended to `faults`.
+    `presets` says which part's presets they are, `plugins` may bring more of them. What is wrong
+    with the file is appended to `faults`.
     """
     text = _preset_files(presets, plugins)[name].read_text("utf-8")
     node, faulty = _tree(text, f"{presets.file} {name}.yaml")
@@ -73,17 +74,19 @@ def preset_file(
 
 @cache
 def _tree(text: str, source: str) -> tuple[Node | None, tuple[Fault, ...]]:
-    """The tree of a preset's text, and what is wrong with it.
+    """The tree of a preset's text, and what is wrong with it; None where it is no YAML.
 
-    Every scenario has some presets, several times, so each is parsed once.
+    `source` names the text in faults. A scenario asks for each preset several times; `@cache`
+    parses it once.
     """
+    # `placed=False`: `source` is no path that a user could open, so marks have no line in it.
     faults: list[Fault] = []
     return read(text, source, faults, placed=False), tuple(faults)
 
 
 def preset_text(presets: Presets, name: str, key: str, plugins: Plugins = ()) -> str:
     """A text, such as `source`, from a preset's file."""
-    node = preset_file(presets, name, [], plugins)
+    node = preset_values(presets, name, [], plugins)
     return str(node.get(key)) if node else ""
 
 
@@ -219,7 +222,7 @@ def _with_source(vessel: Node, plugins: Plugins) -> Node:
     """
     name, source = vessel.word("preset"), vessel.mapping.get("source")
     known = name in preset_names(VESSELS, plugins)
-    base = preset_file(VESSELS, name, [], plugins) if known else None
+    base = preset_values(VESSELS, name, [], plugins) if known else None
     stem = str(base.get("source")).removesuffix(".") if base else ""
     if not base or not source or not str(source.content).startswith(stem):
         return vessel
@@ -244,7 +247,7 @@ def _over_preset(
     if preset is None or preset.content == "" or preset.faulty:
         return given
     if preset.content in names:
-        base = preset_file(presets, str(preset.content), faults, plugins)
+        base = preset_values(presets, str(preset.content), faults, plugins)
         return merge(base, without_misfits(base, given, faults, (key,))) if base else given
     what = f"{presets.noun} {describe_found(preset.content, preset.text)}"
     text = unknown_word(what, str(preset.content), [*names, ANY_FILE])

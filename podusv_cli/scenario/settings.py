@@ -13,7 +13,7 @@ from podusv_cli.core.errors import SizingError
 from podusv_cli.core.phrases import value_text
 from podusv_cli.scenario.explain import summary
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.presets import preset_file, preset_names
+from podusv_cli.scenario.presets import preset_names, preset_values
 from podusv_cli.scenario.yaml_tree import plain
 
 SECTIONS = (
@@ -73,7 +73,7 @@ def _preset(part: Component) -> Component | None:
     if not presets or name not in preset_names(presets):
         return None
     # Faults are thrown away: presets of podusv have none, as tests check.
-    node = preset_file(presets, name, [])
+    node = preset_values(presets, name, [])
     return type(part)(**{**plain(node), "preset": name}) if node else None
 
 

@@ -14,7 +14,7 @@ from podusv_cli.components.measurements.base import FRESH, KNOWN, OWN, VALUE, Me
 from podusv_cli.components.vessels.vessel import VESSELS, Vessel
 from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.core.signal import STATE
-from podusv_cli.scenario.presets import preset_file
+from podusv_cli.scenario.presets import preset_values
 from podusv_cli.scenario.yaml_tree import plain
 
 SIX = len(STATE)
@@ -28,7 +28,7 @@ NEAR = 0.4  # of the way there; also rad, m/s and rad/s
 @cache
 def usual_vessel() -> Vessel:
     """The vessel of all contract tests."""
-    node = preset_file(VESSELS, "paper_nonlinear", [])
+    node = preset_values(VESSELS, "paper_nonlinear", [])
     return Vessel(**{**(plain(node) if node else {}), "preset": "paper_nonlinear"})
 
 

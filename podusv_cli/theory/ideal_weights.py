@@ -92,7 +92,7 @@ def fit_weights(
     f_u, f_r = unloaded_accelerations(loop, now)
     usable = (np.abs(f_u) < 1e100) & (np.abs(f_r) < 1e100)  # not those of a diverging run
     phi = node_outputs(law.network, log)[usable]
-    start, inverse, weights = law.network.initial_weight, _gram(phi), []
+    start, inverse, weights = law.network.initial_weight, _ridge_solver(phi), []
     for f, mass, nominal, sigma in (
         (f_u, loop.vessel.m11, loop.nominal.m11, law.sigma_u),
         (f_r, loop.vessel.m33, loop.nominal.m33, law.sigma_r),
@@ -106,10 +106,11 @@ def fit_weights(
     return IdealWeights(*weights)
 
 
-def _gram(phi: Vector) -> Callable[[Vector, float], Vector]:
+def _ridge_solver(phi: Vector) -> Callable[[Vector, float], Vector]:
     """W(f, c) that minimises |f - Phi W|^2 + c |W|^2, by the smaller of Phi^T Phi and Phi Phi^T.
 
-    `phi` is (rows, nodes). The matrix is made once, for surge and yaw.
+    `phi` is (rows, nodes). The matrix is made once, for surge and yaw. c is at least SINGULAR times
+    the matrix's trace, without which it may be singular; a smaller c is replaced by that floor.
     """
     tall = phi.shape[0] >= phi.shape[1]
     short = phi if tall else phi.T
@@ -117,7 +118,7 @@ def _gram(phi: Vector) -> Callable[[Vector, float], Vector]:
     least = SINGULAR * float(total(square.diagonal())) or 1.0
 
     def weights(f: Vector, c: float) -> Vector:
-        """The weights (nodes,) that fit `f` (rows,); c is the weight of their own size."""
+        """The weights (nodes,) that fit `f` (rows,); c, or the floor, weighs their own size."""
         right = network_output(phi.T, f) if tall else f
         solved = solve(square + max(c, least) * np.eye(len(square)), right)
         return np.asarray(solved if tall else network_output(phi.T, solved))

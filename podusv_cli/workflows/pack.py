@@ -134,9 +134,11 @@ class Packed:
     _archive: archive.Archive
 
     def unpack(self, out: Path, tell: Callable[[float], object] = lambda part: None) -> None:
-        """Write the folder, which appears whole; no file of it is imported or executed.
+        """Write the folder `out`, which appears whole; no file of it is imported or executed.
 
-        Raises StorageError, also where `out` exists or a file is not the one that was packed.
+        `tell` hears the part of the bytes that is written, from 0 to 1. What an earlier unpacking
+        left unfinished beside `out` is removed. Raises StorageError, also where `out` exists or a
+        file is not the one that was packed.
         """
         if out.exists():
             raise StorageError(f"{out} exists; name another folder with --out")
@@ -145,6 +147,7 @@ class Packed:
         staging = Staging(out)
         try:
             self._archive.extract(staging.folder, tell)
+            # Before the folder gets its name; logs may have been left out when it was packed.
             manifest.check(staging.folder, optional=LOG)
             staging.publish(replace=False)
         finally:

@@ -107,6 +107,7 @@ class _LatexReader:
         while self._peek() in ("&", "\\\\"):
             if self._take() == "&":
                 rows[-1].append(self._read_cell())
+            # A `\\` at the end opens no row; a first cell may be empty where more cells follow.
             elif (cell := self._read_cell()) or self._peek() == "&":
                 rows.append([cell])
         return rows

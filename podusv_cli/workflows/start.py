@@ -113,7 +113,7 @@ def start(boat: Boat, out: Path, route: str = "") -> Path:
     the file exists.
     """
     hull, thrusters = _hull(boat, out)
-    way = _way(route, out)
+    way = _route_legs(route, out)
     return _write_new(out, _of_dimensions(hull, thrusters, way, out, known=bool(boat.speed)), way)
 
 
@@ -122,7 +122,7 @@ def start_from(preset: str, out: Path, route: str = "") -> Path:
     known = [name for name in preset_names(VESSELS) if name in preset_names(Pods.presets)]
     if preset not in known:
         raise UsageError(unknown_word(f"boat {preset!r}", preset, known))
-    way = _way(route, out)
+    way = _route_legs(route, out)
     return _write_new(out, _of_preset(preset, way, out), way)
 
 
@@ -289,10 +289,11 @@ def _thrust(words: str, given: str, out: Path) -> tuple[float, str]:
     return actuator.pods[0].most_thrust[0], file
 
 
-def _way(route: str, out: Path) -> StartingLegs | None:
-    """The legs of the file `route` as the scenario `out` names it; None without one.
+def _route_legs(route: str, out: Path) -> StartingLegs | None:
+    """The legs that the file `route` gives, None where `route` is "".
 
-    Raises UsageError for a file that is no route.
+    They name the file by its path relative to the scenario `out`, whose folder is made. Raises
+    UsageError for a file that is no route.
     """
     if not route:
         return None
@@ -300,6 +301,7 @@ def _way(route: str, out: Path) -> StartingLegs | None:
         raise UsageError(f"--route {route}: there is no such file")
     storage.make_folder(out.parent)  # the route is read from there
     file = relative_path(route, out.parent)
+    # `repr` escapes control characters, which would break the lines of the text below.
     path = as_yaml(file) if file.isprintable() else repr(file)
     # A small scenario is loaded to read the route as any scenario would.
     text = f"name: boat\nvessel: {{preset: otter}}\nactuator: {{kind: ideal}}\n{BESIDE}".replace(

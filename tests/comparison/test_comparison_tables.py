@@ -118,6 +118,13 @@ def test_where_a_law_keeps_a_standoff_to_be_nearer_is_not_better():
     frame = table.table({"a": {"iae": 9.0, "iae_e": 5.0}, "b": {"iae": 8.0, "iae_e": 6.0}})
     assert table.leaders(frame) == {"a": ["iae_e"], "b": []}
     assert r"\textbf" not in table.as_latex(frame, chosen=["iae"])
+    # One that stays within half its standoff is farther from it than from the target.
+    inside = table.table({"a": {"iae": 1.0, "iae_e": 3.0}, "b": {"iae": 2.0, "iae_e": 2.0}})
+    assert table.leaders(inside) == {"a": [], "b": ["iae_e"]}
+    without = table.table({"a": {"iae": 1.0, "iae_e": 1.0}, "b": {"iae": 2.0, "iae_e": 2.0}})
+    assert table.leaders(without) == {"a": ["iae", "iae_e"], "b": []}
+    unknown = table.table({"a": {"iae": 1.0, "iae_e": math.nan}, "b": {"iae": 2.0}})
+    assert table.leaders(unknown) == {"a": ["iae"], "b": []}
 
 
 def test_csv_has_units_first_and_ratios_last():

@@ -19,7 +19,7 @@ from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core import escaping
 from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.spectrum import periodogram
-from podusv_cli.figures.animation import stage
+from podusv_cli.figures.animation import draw_scene
 from podusv_cli.figures.curves import thin_curve
 from podusv_cli.figures.drawing import FIGURES, draw
 from podusv_cli.figures.looks import LOOKS, nth_style
@@ -360,7 +360,7 @@ def test_every_figure_shows_labels_as_they_are(runs, followed, name):
 def test_an_animation_shows_labels_as_they_are(runs):
     with house_style():
         figure = new_figure(1, 3.0)
-        stage(figure.add_subplot(), runs)(0.05)
+        draw_scene(figure.add_subplot(), runs)(0.05)
         figure.legend()
         assert image(figure, "png")
 

@@ -343,7 +343,7 @@ def test_every_differing_target_is_drawn_and_named():
 
 def staged(runs):
     axes = Figure().add_subplot()
-    return axes, animation.stage(axes, runs)
+    return axes, animation.draw_scene(axes, runs)
 
 
 def test_frames_run_evenly_from_the_start_to_the_end_of_the_longest_run():
@@ -404,7 +404,7 @@ def test_a_run_that_has_ended_stays_pale_where_it_was():
 
 def test_the_close_up_of_a_film_goes_with_the_first_target_and_has_hulls_to_scale(two):
     axes = Figure().add_subplot()
-    move = animation.stage(axes, two, near=True)
+    move = animation.draw_scene(axes, two, near=True)
     for t in (20.0, 70.0):
         move(t)
         log, row = two[0].recording, round(10 * t)

@@ -116,7 +116,7 @@ def scored(errors, role="judge", log="a.csv", horizon=30.0):
     ],
 )
 def test_which_scores_refuse_a_hull(scores, noise, logs):
-    worse = judge.predicted_worse(judge.decisive(scores), noise)
+    worse = judge.scores_worse_than_prior(judge.decisive(scores), noise)
     assert [own.log for own, _ in worse] == logs
 
 

@@ -14,7 +14,7 @@ from podusv_cli.core.errors import ScenarioError, StorageError
 from podusv_cli.scenario import presets
 from podusv_cli.scenario.load import load, load_stored, load_text, tree_yaml
 from podusv_cli.scenario.point_files import MAX_POINTS
-from podusv_cli.scenario.presets import preset_file, preset_names
+from podusv_cli.scenario.presets import preset_names, preset_values
 from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.yaml_tree import plain
 
@@ -29,7 +29,7 @@ def _in_a_folder(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", preset_names(VESSELS))
 def test_a_preset_is_its_file(name):
     faults: list[object] = []
-    node = preset_file(VESSELS, name, faults)
+    node = preset_values(VESSELS, name, faults)
     assert node is not None
     assert faults == []
     vessel = loaded(SOUND.replace("preset: paper", f"preset: {name}")).scenario.vessel

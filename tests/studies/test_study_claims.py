@@ -88,7 +88,14 @@ def test_shares_that_never_differ_cannot_be_told_apart() -> None:
     verdict = judged(runs, "failures(a) < failures(b)")
     assert verdict.answer is None
     assert verdict.more is None
-    assert "in no draw does one of both conditions hold alone" in verdict.evidence()
+    never = "in no draw does exactly one of the two conditions hold, so the shares do not differ"
+    assert list(verdict.reasons())[-1] == never
+    # The other cell has draws that tell, though too few: only the cell where none does is named.
+    cells, b = ["scale=1", "scale=2"], [[1.0, inf, 2.0], [inf, 1.0, 2.0]]
+    one = judged(
+        study(cells, a=[[1.0, inf, 2.0], [1.0, 1.0, 2.0]], b=b), "failures(a) < failures(b)"
+    )
+    assert list(one.reasons())[-1] == f"for failures(a) alone, not failures(b) at scale=1, {never}"
 
 
 def test_two_shares_are_seldom_told_apart_wrongly() -> None:
@@ -254,6 +261,12 @@ def test_all_cells_have_to_agree() -> None:
     disagree = "the cells disagree: holds at scale=1, fails at scale=2"
     assert disagree in answers[2].evidence()
     assert answers[2].as_json()["needed"] is None
+    # A third cell that is still open changes nothing: no number of its draws would decide.
+    three = judged(
+        study([*cells, "scale=3"], a=np.array([good, bad, between])), "failures(a) <= 0.45"
+    )
+    assert f"{disagree}, cannot tell at scale=3" in three.evidence()
+    assert three.as_json()["needed"] is None
     assert "failures(a) at scale=1 = 0 [0, 0.01" in answers[0].evidence()
 
 
@@ -261,14 +274,19 @@ def test_what_cannot_be_told_says_how_many_draws_would_tell() -> None:
     open_ = judged(study(a=np.ones(100)), "failures(a) <= 0.01")
     assert open_.answer is None
     assert open_.more == 368
-    assert "about 368 draws would decide, if shares stay as they are" in open_.evidence()
+    assert "; about 368 draws would decide, if shares stay as they are" in open_.evidence()
+    two = judged(study(["scale=1", "scale=2"], a=np.ones((2, 100))), "failures(a) <= 0.01")
+    assert "; about 368 draws in each cell would decide, if shares stay" in two.evidence()
     assert judged(study(a=np.ones(368)), "failures(a) <= 0.01").answer is True
     values = np.r_[np.zeros(48), np.ones(2)]
     quantile = judged(study(a=values), "quantile(a.iae, 0.9) <= 0.5")
     assert quantile.more == st.draws_for_share(0.96, 0.9, 0.95)
     assert judged(study(a=1 - values), "quantile(a.iae, 0.1) >= 0.5").more == quantile.more
     bound = judged(study(a=np.r_[np.zeros(5), np.full(5, inf)]), "failures(a) <= 0.5")
-    assert "it cannot be said how many draws would decide" in bound.evidence()
+    # 0.33332 asked for, 1/3 found: some 5e9 draws would decide, more than are ever looked for.
+    near = judged(study(a=np.array([inf, 1.0, 1.0])), "failures(a) <= 0.33332")
+    why = "asked for, or so near them that no practicable number of draws decides"
+    assert all(f"the shares found are those {why}" in one.evidence() for one in (bound, near))
 
 
 def test_the_draws_needed_decide_the_quantile_too() -> None:
@@ -322,6 +340,18 @@ def test_missing_numbers_are_never_counted_silently() -> None:
     missing = judged(lacking, "median(a.energy / c.energy) <= 1")
     assert missing.answer is None
     assert "no run has a number that the claim is about" in missing.evidence()
+    # Where one statistic or one cell alone lacks all numbers, it is named.
+    partly = judged(lacking, "failures(a) <= 0.5 and median(a.energy / c.energy) <= 1")
+    assert list(partly.reasons())[-1] == "no run has a number for median(a.energy / c.energy)"
+    energy, iae = np.array([np.ones(50), np.full(50, nan)]), np.ones((2, 50))
+    gridded = Made({"a": {"iae": iae, "energy": energy}}, ["scale=1", "scale=2"], 50)
+    lost = judged(gridded, "median(a.energy) <= 2")
+    assert list(lost.reasons())[-1] == "no run has a number for median(a.energy) at scale=2"
+    undone = {"a": np.array([[False] * 50, [True] * 50])}
+    half = judged(
+        Made({"a": {"iae": iae}}, ["scale=1", "scale=2"], 50, undone), "failures(a) <= 0.5"
+    )
+    assert list(half.reasons())[-1] == "no draw has runs of all laws in failures(a) at scale=2"
     some = np.where(np.arange(100) < 20, nan, 0.0)
     runs = Made({"a": {"iae": np.ones(100), "energy": some}})
     open_ = judged(runs, "share(a.energy <= 1) >= 0.85")

@@ -5,7 +5,7 @@ import math
 from podusv_cli.components.actuators.pod import Pods
 from podusv_cli.components.vessels.estimated import Hull, estimate_vessel
 from podusv_cli.components.vessels.vessel import VESSELS, Vessel
-from podusv_cli.scenario.presets import preset_file, preset_names
+from podusv_cli.scenario.presets import preset_names, preset_values
 from podusv_cli.scenario.yaml_tree import plain
 
 # Two hulls where there are two, as wide as otter.m of MSS and the pontoons of VRX say.
@@ -21,14 +21,14 @@ KNOWN = {
 
 def vessel(name):
     """A vessel of podusv."""
-    return Vessel(**plain(preset_file(VESSELS, name, [])))
+    return Vessel(**plain(preset_values(VESSELS, name, [])))
 
 
 def thrust(name):
     """All thrust ahead of the thrusters that podusv has of a vessel [N]; NaN without any."""
     if name not in preset_names(Pods.presets):
         return math.nan
-    pods = plain(preset_file(Pods.presets, name, []))["pods"]
+    pods = plain(preset_values(Pods.presets, name, []))["pods"]
     return sum(pod["T_nn"] * pod["n_max"] ** 2 for pod in pods)
 
 

@@ -107,6 +107,8 @@ def beyond(demand: float, zone: float) -> float:
     return demand - zone if demand > 0.0 else demand + zone
 
 
+# Arguments as those of `Actuator.drive`. `specialise` puts the actuator's kernel in its place; this
+# body is never compiled.
 def _inner(
     t: float,
     x: Vector,

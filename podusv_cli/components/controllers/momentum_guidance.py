@@ -65,10 +65,12 @@ def level_gain(gain: float, at: Seen, closing: float) -> LevelledGain:
     return LevelledGain(kappa, -kappa * q2 * slope * closing)
 
 
-# x (6) state, `at` the target as `see_target` sees it, k_b [1/s]. d is the target's velocity less
-# the vessel's, T the part of the distance along the target's course, in a projection that the bow
-# fades into below V_m. V_c = t + kappa_across e + (kappa_along - kappa_across) T; its turn is the
-# target's alone.
+# x (6) state, `at` the target as `see_target` sees it, k_b [1/s]; of k only V_m [m/s] is read. The
+# ends _a and _b are ahead and to starboard. d [m/s] is the target's velocity less the vessel's, the
+# rate of the distance e. T [m] is the part of e along the target's course: with the bow's unit
+# vector n, T = (t t^T + V_m^2 n n^T) e/(|t|^2 + V_m^2), so near rest the bow stands for the course.
+# V_c = t + kappa_across e + (kappa_along - kappa_across) T. Its rate takes that projection as
+# constant, and its turn is that of the target's course alone.
 @kernel
 def guidance(x: Vector, at: Seen, along: LevelledGain, k_b: float, k: Any) -> Wanted:
     """V_c and its surge rate: the gain k_b across the target's course, and `along` along it.

@@ -213,10 +213,11 @@ class PolarBackstepping(TrackingController):
         return alpha_u * 0.0 + np.inf, alpha_r * 0.0 + np.inf
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """(26), (27) with a = W . Phi at frozen Phi: a' = Gamma (m |Phi|^2 e - sigma a).
+        """The loops of surge and yaw, (26), (27) with a = W . Phi at Phi frozen at `nu` (3,).
 
-        `nu` (3,) is where Phi is frozen; `b.initial`/(4 partial) is the gain of the bound at its
-        start.
+        With e the velocity error, M the true and m the nominal inertia of an axis:
+        M e' = -(k + b) e - m a, beside the hull's damping, and a' = Gamma (m |Phi|^2 e - sigma a).
+        Here b = `b.initial`/(4 partial) is the gain of the adapted bound at its start.
         """
         power = float((activation(self.network, nu[None]) ** 2).sum())
         learnt = (

@@ -208,7 +208,11 @@ Follow = Callable[[FilterRecord, Sequence[Vector], Sequence[Vector], bool], Foll
 
 
 def pieces(actuator: Actuator) -> list[Any]:
-    """What is compiled for the filter along a log of this actuator's commands."""
+    """The three pieces to compile for the filter along a log of this actuator's commands.
+
+    They are the actuator's loads, the hull's `follow` and the march, `filter_rows`. All lanes have
+    one actuator, so its constants are equal in all; of the hull's constants only ASKED is.
+    """
     from podusv_cli.engine.machine import compile
 
     names = tuple(actuator.constants())

@@ -27,7 +27,7 @@ class Sample(ABC):
 
     In a share's comparisons of two laws, `both_failed` and `close` count the draws in which both
     failed, and those in which they differ by no more than the margin. Of two shares, `differ`
-    counts the draws in which one of both conditions holds alone.
+    counts the draws in which exactly one of the two conditions holds.
     """
 
     cell: str

@@ -17,7 +17,7 @@ class Statistic:
     """A statistic of a claim in one cell, with its interval at this level.
 
     `unknown` draws lack a number. `both_failed` and `close` are draws without a winner. In `differ`
-    draws one of two conditions holds alone.
+    draws exactly one of two conditions holds.
     """
 
     statistic: str
@@ -53,16 +53,20 @@ class Statistic:
             sample.differ,
         )
 
+    @property
+    def title(self) -> str:
+        """Such as `failures(pid) at scale=2`; without a grid the statistic alone."""
+        return f"{self.statistic} at {self.cell}" if self.cell else self.statistic
+
     def in_words(self) -> str:
         """Such as `failures(pid) = 0.01 [0.002, 0.03] in 400 draws`."""
-        at = f" at {self.cell}" if self.cell else ""
         counts = [f"{self.n} draws" if self.n else "no draw"]
         counts += [f"both failed in {self.both_failed}"] if self.both_failed else []
         counts += [f"{self.close} within the margin"] if self.close else []
         counts += [f"one of both alone in {self.differ}"] if self.differ else []
         counts += [f"a number is missing in {self.unknown}"] if self.unknown else []
         interval = Interval(self.estimate, self.low, self.high)
-        return f"{self.statistic}{at} = {interval:.4g} ({', '.join(counts)})"
+        return f"{self.title} = {interval:.4g} ({', '.join(counts)})"
 
     def as_json(self) -> dict[str, object]:
         """Plain data; what is infinite or undefined is None.
@@ -100,9 +104,15 @@ class StudyVerdict(Verdict):
 
     @property
     def more(self) -> int | None:
-        """Draws of a cell that would decide the claim; None where that is not known."""
+        """Draws of a cell that would decide the claim; None where no number would."""
         counts = [count for count in self.needed if count is not None]
-        return max(counts) if counts and len(counts) == len(self.needed) else None
+        known = counts and len(counts) == len(self.needed) and not self._disagrees
+        return max(counts) if known else None
+
+    @property
+    def _disagrees(self) -> bool:
+        """Whether it holds in a cell and fails in another, which more draws do not change."""
+        return {True, False} <= {*self.by_cell.values()}
 
     def evidence(self) -> str:
         """The numbers and the reasons, in one line."""
@@ -114,7 +124,7 @@ class StudyVerdict(Verdict):
         if self.preliminary:
             yield f"preliminary: {self.draws} of {self.wanted} draws"
         if self.answer is None:
-            yield self._doubt()
+            yield self._why_open()
         if self.broken:
             yield f"{self.broken} runs crashed, hung or were invalid, and count as failed"
         if self.without_broken != self.answer:
@@ -125,30 +135,40 @@ class StudyVerdict(Verdict):
     def _inside(self) -> float:
         return self.parts[0].level if self.parts else self.level
 
-    def _doubt(self) -> str:
+    def _why_open(self) -> str:
         """Why the answer is "cannot tell", and what would change that.
 
         The reasons come in the order in which they explain: without runs nothing else matters.
         """
         if not self.draws:
-            return "no draw has runs of all laws in the claim"
-        if None not in self.by_cell.values():
+            of = self._name_parts([part for part in self.parts if not part.n])
+            return f"no draw has runs of all laws in {of or 'the claim'}"
+        if self._disagrees:
             cells = (f"{self.word_for(answer)} at {cell}" for cell, answer in self.by_cell.items())
             return f"the cells disagree: {', '.join(cells)}"
-        if any(part.unknown == part.n for part in self.parts):
-            return "no run has a number that the claim is about"
+        if missing := [part for part in self.parts if part.unknown == part.n]:
+            of = self._name_parts(missing)
+            return f"no run has a number {f'for {of}' if of else 'that the claim is about'}"
         if any(part.unknown for part in self.parts):
             return "missing numbers leave the answer open"
-        if any(math.isnan(part.estimate) for part in self.parts):
-            return "in no draw does one of both conditions hold alone, so the shares do not differ"
+        # Two shares have no estimate where no draw tells them apart.
+        if alike := [part for part in self.parts if math.isnan(part.estimate)]:
+            of = self._name_parts(alike)
+            return (
+                f"{f'for {of}, ' if of else ''}in no draw does exactly one of the two conditions "
+                "hold, so the shares do not differ"
+            )
         if self.more is None:
             return (
-                "the shares found are just those asked for, so it cannot be said how many draws "
-                "would decide"
+                "the shares found are those asked for, or so near them that no practicable number "
+                "of draws decides"
             )
-        return (
-            f"about {max(self.more, self.draws + 1)} draws would decide, if shares stay as they are"
-        )
+        count, each = max(self.more, self.draws + 1), " in each cell" * (len(self.by_cell) > 1)
+        return f"about {count} draws{each} would decide, if shares stay as they are"
+
+    def _name_parts(self, parts: Sequence[Statistic]) -> str:
+        """These parts of the claim by their titles; "" where they are all that it has."""
+        return ", ".join(part.title for part in parts) if len(parts) < len(self.parts) else ""
 
     def as_json(self) -> dict[str, object]:
         """The verdict as plain data."""

@@ -26,7 +26,7 @@ from podusv_cli.figures.sketch import COLUMNS, Sketch
 from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.studies.counting import statistics
 from podusv_cli.studies.counting.expressions import FINISHED, judge_success, parse_success
-from podusv_cli.studies.telling.keep import Track
+from podusv_cli.studies.telling.keep import DistanceCurve
 from podusv_cli.studies.telling.results import Results
 from podusv_cli.studies.telling.summary import column_of
 
@@ -44,8 +44,8 @@ CENTRED: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 6.0}
 UNKNOWN = "#BBBBBB"
 
 
-def sketches(results: Results, tracks: Mapping[str, Sequence[Track]]) -> Iterator[Sketch]:
-    """The figures that the study has numbers for; `tracks` are those of kept runs, by law."""
+def sketches(results: Results, curves: Mapping[str, Sequence[DistanceCurve]]) -> Iterator[Sketch]:
+    """The figures that the study has numbers for; `curves` are those of kept runs, by law."""
     cells = range(min(len(results.runs.cells), MOST_CELLS))
     for name in results.shown_metrics:
         for cell in cells:
@@ -58,7 +58,7 @@ def sketches(results: Results, tracks: Mapping[str, Sequence[Track]]) -> Iterato
     for name in results.shown_metrics:
         for cell in cells:
             yield from _correlations(results, name, cell)
-    yield from _funnel(tracks)
+    yield from _funnel(curves)
 
 
 def _name_figure(kind: str, results: Results, cell: int) -> str:
@@ -219,14 +219,14 @@ def _correlations(results: Results, name: str, cell: int) -> Iterator[Sketch]:
         )
 
 
-def _funnel(tracks: Mapping[str, Sequence[Track]]) -> Iterator[Sketch]:
+def _funnel(curves: Mapping[str, Sequence[DistanceCurve]]) -> Iterator[Sketch]:
     """Distance to the target over time of the kept runs, by law."""
-    if count := sum(map(len, tracks.values())):
+    if count := sum(map(len, curves.values())):
         yield Sketch(
             "funnel",
             f"distance to the target over time in the {count} runs whose logs are kept: a "
             "choice of failed, worst and named runs, not of typical ones",
-            partial(funnel, tracks),
+            partial(funnel, curves),
         )
 
 
@@ -372,7 +372,7 @@ def correlations(sensitivity: pd.DataFrame) -> Figure:
     return figure
 
 
-def funnel(curves: Mapping[str, Sequence[Track]]) -> Figure:
+def funnel(curves: Mapping[str, Sequence[DistanceCurve]]) -> Figure:
     """The distance to the target over time of every run, in the colour of its law."""
     figure = new_figure(COLUMNS, 2.6)
     axes = figure.add_subplot()

@@ -22,7 +22,7 @@ from podusv_cli.studies.counting.runs_file import RunsTable
 from podusv_cli.studies.telling.results import Results
 
 POINTS = 2000  # of a kept run's curve in a figure
-Track = tuple[Vector, Vector]  # time [s] and distance to the target [m]
+DistanceCurve = tuple[Vector, Vector]  # time [s] and distance to the target [m], both (n,)
 
 
 class KeptRun(NamedTuple):
@@ -155,17 +155,21 @@ def contradiction(kept: Sequence[Kept]) -> str:
     )
 
 
-def tracks(kept: Sequence[Kept], extras: Extras) -> dict[str, list[Track]]:
-    """The distance to the target over time in every kept log that has it, by law."""
-    by_law: dict[str, list[Track]] = {}
+def distance_curves(kept: Sequence[Kept], extras: Extras) -> dict[str, list[DistanceCurve]]:
+    """The distance to the target over time in every kept log that has it, by law.
+
+    Times [s] and distances [m] of a run are (n,), with POINTS rows at most. A curve that cannot be
+    read is noted in `extras` and left out.
+    """
+    by_law: dict[str, list[DistanceCurve]] = {}
     for run in kept:
-        track = extras.make_or_record(f"the track of {run.wanted.name}", partial(_track, run))
-        if track:
-            by_law.setdefault(run.wanted.law, []).append(track)
+        name = f"the track of {run.wanted.name}"
+        if curve := extras.make_or_record(name, partial(_distance_curve, run)):
+            by_law.setdefault(run.wanted.law, []).append(curve)
     return by_law
 
 
-def _track(kept: Kept) -> Track | None:
+def _distance_curve(kept: Kept) -> DistanceCurve | None:
     """Times [s] and distances z_e [m] of a kept run, `POINTS` at most; None without them."""
     if kept.run is None or "z_e" not in kept.run.recording:
         return None

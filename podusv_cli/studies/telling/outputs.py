@@ -19,7 +19,7 @@ from podusv_cli.storage.run_folder import MISSING
 from podusv_cli.studies.counting.runs import AXES, ENDING, STATUSES
 from podusv_cli.studies.counting.runs_file import RunsTable
 from podusv_cli.studies.making.sessions import timing
-from podusv_cli.studies.telling.keep import Kept, tracks
+from podusv_cli.studies.telling.keep import Kept, distance_curves
 from podusv_cli.studies.telling.results import Results
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def write_report(
 ) -> None:
     """Draw the figures and write report.html and figures/. Raises StorageError.
 
-    `kept` are the runs with logs, whose tracks become a figure. A figure or page that fails is
+    `kept` are the runs with logs, whose distances become a figure. A figure or page that fails is
     noted in `extras`, and then listed in the file of missing things. Files of an earlier report
     that are not made again are removed, since they would show other runs.
     """
@@ -64,7 +64,7 @@ def write_report(
         from podusv_cli.figures.sketch import render_sketches  # matplotlib is slow to import
         from podusv_cli.studies.telling.figures import sketches
 
-        drawn, shown = render_sketches(sketches(results, tracks(kept, extras)), extras)
+        drawn, shown = render_sketches(sketches(results, distance_curves(kept, extras)), extras)
     page = extras.make_or_record(
         REPORT, lambda: report.page(folder, results, kept, shown, extras.missing)
     )

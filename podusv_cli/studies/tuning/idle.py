@@ -69,9 +69,10 @@ def _points(plan: TunePlan, law: str) -> Iterator[Gains]:
 
 
 def _matters(run: Any, own: UnitResult, point: Gains, gain: Gain) -> bool:
-    """Whether an end of the gain's range changes the run at this point, or is refused.
+    """Whether `gain` changes the run at an end of its range, or one of its words does.
 
-    `run` simulates given gains; `own` is its result at `point`.
+    The other gains stay as at `point`, whose run has the result `own`. `run` takes gains and
+    returns a result, or None where the law refuses them; a refused end counts as a change.
     """
     others = (run({**point, gain.key: end}) for end in gain.ends)
     return any(other is None or _differ(own, other) for other in others)
