@@ -140,7 +140,7 @@ TABLE: dict[str, list[Row]] = {
      "test_what_a_library_prints_of_a_damaged_log_is_a_warning"),
     ("    if not (path.is_file() or path.is_dir()):\n        raise LogFault",
      "    if False:\n        raise LogFault", "test_a_pipe_or_a_device_is_no_log"),
-    ("_in_quotes(split_unit(own.name)[0] + unit)",
+    ("quote_for_yaml(split_unit(own.name)[0] + unit)",
      "chr(34) + split_unit(own.name)[0] + unit + chr(34)",
      "test_names_with_quotes_are_yaml"),
     ("    if rows >= NEAREST:\n", "    if True:\n",

@@ -11,6 +11,8 @@ from typing import Any
 MOST, NEAREST = 12, 5  # words that a message lists; of more than that, so many
 MOST_LINES = 3  # of a text that is shown as it is
 LONGEST_WORD = 400  # characters that are shown as they are
+# A name with an ending or in a folder: YAML takes it for no number and no word such as null.
+PLAIN_PATH = re.compile(r"(\.\./)*[A-Za-z_][\w-]*[./][\w./-]*", re.ASCII)
 
 
 def quote(text: str) -> str:
@@ -33,6 +35,18 @@ def as_yaml(content: Any) -> str:
     """A plain value as it would stand in a scenario, cut where it is long."""
     text = content if isinstance(content, str) and content else json.dumps(content)
     return quote(text) if len(text) > 60 or not text.isprintable() else text
+
+
+def quote_for_yaml(text: str) -> str:
+    """Text as YAML has it between double quotes, on one line."""
+    marks = {'"': r"\"", "\\": r"\\"}
+    shown = (marks.get(c, c if c.isprintable() else rf"\U{ord(c):08x}") for c in text)
+    return f'"{"".join(shown)}"'
+
+
+def path_for_yaml(path: str) -> str:
+    """A path as YAML has it: plain where nothing in it has another meaning there, else quoted."""
+    return path if PLAIN_PATH.fullmatch(path) else quote_for_yaml(path)
 
 
 def value_text(value: Any) -> str:

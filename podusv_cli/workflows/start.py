@@ -20,7 +20,7 @@ from podusv_cli.components.vessels.vessel import VESSELS, Vessel
 from podusv_cli.core import units
 from podusv_cli.core.component import unit_of
 from podusv_cli.core.errors import ScenarioError, StorageError, UsageError
-from podusv_cli.core.phrases import as_yaml, unknown_word
+from podusv_cli.core.phrases import path_for_yaml, unknown_word
 from podusv_cli.core.plugins import installed_plugins
 from podusv_cli.core.system import relative_path
 from podusv_cli.findings.finding import finding_kinds, unknown_codes
@@ -272,7 +272,7 @@ def _thrust(words: str, given: str, out: Path) -> tuple[float, str]:
         )
     storage.make_folder(out.parent)  # the table is read from there
     name = os.path.relpath(words, out.parent)
-    file = as_yaml(name) if name.isprintable() else repr(name)
+    file = path_for_yaml(name)
     # A scenario of two such pods is loaded to read the table as any scenario would.
     alike = [
         f"{{x: -1, y: {y}, table: {file}, n_rate: 4, n_lag: 0.3, angle_limit: 0}}" for y in (-1, 1)
@@ -301,8 +301,7 @@ def _route_legs(route: str, out: Path) -> StartingLegs | None:
         raise UsageError(f"--route {route}: there is no such file")
     storage.make_folder(out.parent)  # the route is read from there
     file = relative_path(route, out.parent)
-    # `repr` escapes control characters, which would break the lines of the text below.
-    path = as_yaml(file) if file.isprintable() else repr(file)
+    path = path_for_yaml(file)
     # A small scenario is loaded to read the route as any scenario would.
     text = f"name: boat\nvessel: {{preset: otter}}\nactuator: {{kind: ideal}}\n{BESIDE}".replace(
         "kind: line", f"kind: legs, file: {path}"

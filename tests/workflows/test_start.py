@@ -404,6 +404,17 @@ def test_what_validate_would_refuse_is_not_written(podusv):
     assert not Path("b8.yaml").exists()
 
 
+@pytest.mark.parametrize(
+    "name", [f"{'a' * 70}.csv", "my: route #1.csv", "tab\tand 'quotes'.csv", "null", "1e3"]
+)
+def test_a_route_may_have_any_name(podusv, name):
+    """A name of YAML's own, and one that is longer than a message shows."""
+    Path(name).write_text("lat,lon\n50,6\n50.001,6\n50.001,6.001\n")
+    said = podusv("start", "near", "--preset", "otter", "--route", name)
+    assert said.code == 0, said.err
+    assert len(load(Path("near.yaml")).scenario.path.points) == 3
+
+
 def test_a_route_that_no_log_holds_says_how_long_it_is(podusv):
     """Ten degrees of latitude, as the plane has them."""
     Path("far.csv").write_text("lat,lon\n50,6\n60,6\n")

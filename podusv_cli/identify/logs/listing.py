@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -12,12 +11,12 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-import yaml
 
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.earth import PLACE
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.phrases import quote_for_yaml
 from podusv_cli.identify.logs.checks import FINER, SLOWEST
 from podusv_cli.identify.logs.contents import Columns, Contents, LogFault, list_names
 from podusv_cli.identify.logs.formats import contents_of
@@ -151,7 +150,7 @@ class Listing:
         for own in self.columns:
             if own.quantity:
                 unit = f" [{own.unit}]" if own.unit else ""
-                lines.append(f"  {own.quantity}: {_in_quotes(split_unit(own.name)[0] + unit)}")
+                lines.append(f"  {own.quantity}: {quote_for_yaml(split_unit(own.name)[0] + unit)}")
         known = {own.quantity for own in self.columns}
         clocks = {own.name for own in self.columns}
         if all(clock_of(own.name, clocks) for own in self.columns if own.quantity):
@@ -166,12 +165,6 @@ class Listing:
         if self.turned:
             lines.append("frame: enu  # ROS counts x to the east, y to the north, turns to port")
         return lines
-
-
-def _in_quotes(text: str) -> str:
-    """Text as YAML has it between double quotes."""
-    dumped: str = yaml.safe_dump(text, default_style='"', allow_unicode=True, width=math.inf)
-    return dumped.strip()
 
 
 def listing(path: Path) -> Listing:
