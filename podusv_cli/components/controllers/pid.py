@@ -92,11 +92,7 @@ class Pid(TrackingController):
         return HELD + each(MEMORY) + self.swaying()
 
     def begin(self, x: Vector, target: Vector, k: Any) -> Vector:
-        """The memory (slots,): integrals at zero, lagged errors at zero or at the error.
-
-        `x` (6,) and `target` (6,) are those at t = 0, `k` has the law's constants; the errors are
-        those after the first sample.
-        """
+        """The memory (slots,) at t = 0: integrals at zero, lagged errors at zero or at the error."""
         memory = super().begin(x, target, k)
         if self.lag_start == "error":
             u_d, r_d = reference(self.first_errors(x, memory, target, k), target, k)

@@ -38,8 +38,7 @@ TURNS = 2  # position in the memory
 TURNING = Signal("turns", "1", "1 while it turns on the spot, else 0")
 
 
-# x (6) state, target (6), u_d [m/s]. A path further away than the reach is met at a right angle.
-# across [m] is the vessel to starboard of the path, `ahead` the way along it to the circle.
+# x (6), target (6). Beyond reach a path is met at a right angle; `across` is to starboard of it [m].
 @kernel
 def heading_error(x: Vector, target: Vector, u_d: float, k: Any) -> float:
     """Bearing of where a circle about the vessel meets the path, or of the path, less psi [rad]."""
@@ -51,7 +50,6 @@ def heading_error(x: Vector, target: Vector, u_d: float, k: Any) -> float:
     return wrap(course + arctangent(-across, ahead) - x[2])
 
 
-# off [rad]; in rad/s.
 @kernel
 def wanted_turn(off: float, k: Any) -> float:
     """Wanted yaw rate for a heading error [rad/s]; 0 below the threshold."""
@@ -118,8 +116,6 @@ class Px4(Rover):
         """Key and gain [1/s] with which it turns the hull."""
         return "yaw_P", self.yaw_P
 
-    # x (6) state, target (6); changes memory (3). It begins to turn at k.stops_at and ends at
-    # k.drives_at.
     @staticmethod
     @kernel
     def sample(x: Vector, memory: Vector, target: Vector, k: Any) -> None:
@@ -130,9 +126,7 @@ class Px4(Rover):
         memory[THROTTLE_I] *= 1.0 - memory[TURNS]
         memory[STEERING_I] *= 0.0 if wanted_turn(off, k) == 0.0 else 1.0
 
-    # x (6), memory and rate (3), target (6); writes tau (2) [N, N m], rate and signals (4). `room`
-    # is what the steering leaves of full scale; speeds below their thresholds count as 0, as in the
-    # firmware.
+    # Writes tau (2) [N, N m]; speeds below their thresholds count as 0, as in the firmware.
     @staticmethod
     @kernel
     def law(
