@@ -92,7 +92,7 @@ class Pid(TrackingController):
         return HELD + each(MEMORY) + self.swaying()
 
     def begin(self, x: Vector, target: Vector, k: Any) -> Vector:
-        """The memory (slots,) at t = 0: integrals at zero, lagged errors at zero or at the error."""
+        """Memory (slots,) at t = 0: integrals at zero, lagged errors at zero or at the error."""
         memory = super().begin(x, target, k)
         if self.lag_start == "error":
             u_d, r_d = reference(self.first_errors(x, memory, target, k), target, k)

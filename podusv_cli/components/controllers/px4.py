@@ -38,7 +38,7 @@ TURNS = 2  # position in the memory
 TURNING = Signal("turns", "1", "1 while it turns on the spot, else 0")
 
 
-# x (6), target (6). Beyond reach a path is met at a right angle; `across` is to starboard of it [m].
+# x, target (6). Beyond reach a path is met at a right angle; `across` is to starboard of it [m].
 @kernel
 def heading_error(x: Vector, target: Vector, u_d: float, k: Any) -> float:
     """Bearing of where a circle about the vessel meets the path, or of the path, less psi [rad]."""
