@@ -82,11 +82,12 @@ def pairs(made: pd.DataFrame) -> pd.DataFrame:
 
 
 def paragraph(made: pd.DataFrame) -> str:
-    """The pooled numbers and the lowest cells."""
-    pooled = count_held(made)
+    """The pooled numbers, those without the sea that is worst, and the lowest cells."""
+    pooled, calmer = count_held(made), count_held(made[made.sea != "gusts"])
     return (
         f"Of the {pooled['determined']} numbers and forces that count as determined "
-        f"{pooled['held']:.1f} % lie in their intervals, with an rms of {pooled['rms']:.2f}."
+        f"{pooled['held']:.1f} % lie in their intervals, with an rms of {pooled['rms']:.2f}; "
+        f"in the {calmer['sets']} sets without gusts {calmer['held']:.1f} %, {calmer['rms']:.2f}."
         f"{_lowest_pairs(pairs(made))}"
     )
 
