@@ -209,7 +209,7 @@ class Pod(Component):
         if dead_band > 0.0:
             rows = np.concatenate([astern[::-1], [[0.0, 0.0]], ahead])
         rows = rows[np.append(True, np.diff(rows[:, 0]) > 0.0)]  # without n astern rest comes once
-        given = dict.fromkeys(BY_SQUARE) | {"table": tuple(map(tuple, rows.tolist()))}
+        given = dict.fromkeys(BY_SQUARE) | {"table": _short(rows)}
         still = {"pwm": self.pwm.changed({"dead_band": None})} if self.pwm else {}
         return self.changed({**given, **still, "table_in": "n", "table_factor": 1.0})
 
@@ -272,6 +272,11 @@ class Pod(Component):
         turned = [self.mount] + ([self.mount + 0.5 * math.pi] if self.angle_limit > 0.0 else [])
         ways = [(_round(math.cos(at)), _round(math.sin(at))) for at in turned]
         return [(X, Y, self.x * Y - self.y * X) for X, Y in ways]
+
+
+def _short(rows: Vector) -> tuple[ThrustRow, ...]:
+    """Rows (rows, 2) of a table with as many digits as a reader can use."""
+    return tuple((float(f"{n:.9g}"), float(f"{T:.6g}")) for n, T in rows.tolist())
 
 
 def _round(part: float) -> float:
