@@ -411,12 +411,8 @@ class Pods(Actuator):
     def with_thrust(self, factor: float, dead_band: float, exponent: float) -> Self | None:
         """By tables where dead band or exponent bend the curve; None beside a rudder then."""
         pods = [pod.with_thrust(factor, dead_band, exponent) for pod in self.pods]
-        words = f"thrust times {factor:.4g}, dead band {dead_band:.4g}, exponent {exponent:.4g}"
-        new = {
-            "preset": "",
-            "pods": tuple(pods),
-            "source": f"{self.source} Since: {words}.".strip(),
-        }
+        words = f"Thrust times {factor:.4g}, dead band {dead_band:.4g}, exponent {exponent:.4g}."
+        new = {"preset": "", "pods": tuple(pods), "source": f"{self.source} {words}".strip()}
         return None if None in pods else self.changed(new)
 
     def _each(self, *vectors: Signal) -> tuple[Signal, ...]:
