@@ -139,7 +139,7 @@ class FitProblem:
         return numbers
 
     @property
-    def _curved(self) -> bool:
+    def _seeks_thrust_curve(self) -> bool:
         """Whether dead band and exponent of the thrust are looked for."""
         return any(number.name in CURVE for number in self.hull)
 
@@ -276,7 +276,7 @@ class FitProblem:
 
     @cached_property
     def _follow(self) -> Follow:
-        return side_by_side(self.scenario.actuator, bent=self._curved)
+        return side_by_side(self.scenario.actuator, bent=self._seeks_thrust_curve)
 
     def start(
         self, log: FilterLog, current: Sequence[float], values: Vector, *, first_known: bool = True
