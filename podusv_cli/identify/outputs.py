@@ -18,7 +18,7 @@ from podusv_cli.core.recording import Status
 from podusv_cli.identify.answer import AXES, Force, Identification
 from podusv_cli.identify.fit.estimate import OPEN, SILENT
 from podusv_cli.identify.fit.march import COMPASS, CURRENT, CURVE, DELAY, THRUST
-from podusv_cli.identify.fit.wander import DEVIATION, LASTING
+from podusv_cli.identify.fit.beside import DEVIATION, LASTING
 from podusv_cli.identify.judge import WHO, Score
 from podusv_cli.identify.phrases import open_words, summary
 from podusv_cli.pages.page import Picture, environment, flat

@@ -28,7 +28,7 @@ from podusv_cli.identify.fit.march import (
 )
 from podusv_cli.identify.fit.records import log_of
 from podusv_cli.identify.fit.sensing import position_wandering
-from podusv_cli.identify.fit.wander import OWN, PLAIN, SIZE
+from podusv_cli.identify.fit.beside import PLAIN, SIZE, entry
 from podusv_cli.identify.phrases import summary
 
 K = {
@@ -42,7 +42,7 @@ K = {
         "current_x": 0.2,
         "current_y": -0.1,
     },
-    **{"s_g": 0.4, "T_g": 3.7, "wandering": 1.0, "compass": 0.08},
+    **{"s_g": 0.4, "T_g": 3.7, "T_b": 0.9, "compass": 0.08},
 }
 
 
@@ -52,7 +52,10 @@ def mean_sign(x, variance):
 
 
 def rates_and_slopes(x, P, tau, k):
-    """Right-hand sides of the eleven numbers and their derivatives, by matrices."""
+    """Right-hand sides of all numbers and their derivatives, by matrices.
+
+    They are the nine of the filter, two errors of positions, three rates of loads.
+    """
     _, _, psi, u, v, r = x[:6]
     c, s = math.cos(psi), math.sin(psi)
     M = np.array([[k["m11"], 0, 0], [0, k["m22"], k["m23"]], [0, k["m32"], k["m33"]]])
@@ -75,10 +78,12 @@ def rates_and_slopes(x, P, tau, k):
             ],
         ]
     )
-    f = np.zeros(11)
+    f = np.zeros(14)
     f[:3] = R @ nu
     f[3:6] = np.linalg.solve(M, k["coriolis"] * coriolis + D @ nu + tau + R.T @ x[6:9])
-    f[9:] = -x[9:] / k["T_g"]
+    f[6:9] = k["smooth"] * x[11:]
+    f[9:11] = -x[9:11] / k["T_g"]
+    f[11:] = -x[11:] / k["T_b"]
     sv, sr = mean_sign(v, P[4, 4]), mean_sign(r, P[5, 5])
     by_nu = D.copy()
     by_nu[0, 0] += k["X_uu"] * abs(u) + 2.0 * k["X_uuu"] * u * u
@@ -93,21 +98,29 @@ def rates_and_slopes(x, P, tau, k):
             [(m11 - m22) * v - m23 * r, (m11 - m22) * u, -m23 * u],
         ]
     )
-    F = np.zeros((11, 11))
+    F = np.zeros((14, 14))
     F[0:3, 3:6] = R
     F[0, 2], F[1, 2] = -s * u - c * v, c * u - s * v
     F[3:6, 3:6] = np.linalg.solve(M, by_nu)
     turned = np.array([[-s, c, 0], [-c, -s, 0], [0, 0, 0]])
     F[3:6, 2] = np.linalg.solve(M, turned @ x[6:9])
     F[3:6, 6:9] = np.linalg.solve(M, R.T)
-    F[9, 9] = F[10, 10] = -1.0 / k["T_g"]
+    F[6:9, 11:] = k["smooth"] * np.eye(3)
+    F[9:11, 9:11] = -np.eye(2) / k["T_g"]
+    F[11:, 11:] = -np.eye(3) / k["T_b"]
     return f, F
 
 
 def marched(x, P, tau, h, k):
     """One step of classical RK4 of estimate and covariance."""
-    walks = [k[q] ** 2 for q in ("q_u", "q_v", "q_r", "q_b", "q_b", "q_b_psi")]
-    Q = np.diag([0.0, 0.0, 0.0, *walks, *[2.0 * k["s_g"] ** 2 / k["T_g"]] * 2])
+    moving, *loads = (
+        np.square([k[q] for q in names])
+        for names in (("q_u", "q_v", "q_r"), ("q_b", "q_b", "q_b_psi"))
+    )
+    loads = np.array(loads[0])
+    walks, rates = loads * (1.0 - k["smooth"]), loads * k["smooth"] / k["T_b"] ** 2
+    errors = [2.0 * k["wandering"] * k["s_g"] ** 2 / k["T_g"]] * 2
+    Q = np.diag([0.0, 0.0, 0.0, *moving, *walks, *errors, *rates])
 
     def rate(x, P):
         f, F = rates_and_slopes(x, P, tau, k)
@@ -130,10 +143,10 @@ def corrected(x, P, line, since, k):
     wx, wy = k["current_x"], k["current_y"]
     for i in np.flatnonzero(line[DELIVERED : DELIVERED + 6]):
         c, s = math.cos(x[2]), math.sin(x[2])
-        h, expected = np.zeros(11), x[i]
+        h, expected = np.zeros(14), x[i]
         h[i] = 1.0
         if i < 2:
-            h[9 + i] = 1.0
+            h[9 + i] = k["wandering"]
             expected += x[9 + i] + since * (wx, wy)[i]
         elif i == 2:
             expected += k["compass"]
@@ -150,32 +163,35 @@ def corrected(x, P, line, since, k):
     return x, P, found
 
 
-def test_the_filter_with_an_error_that_wanders_is_that_of_plain_numpy():
-    """Eleven numbers in one matrix, by algebra of matrices: the likelihood to nine digits."""
+@pytest.mark.parametrize(("wandering", "smooth"), [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)])
+def test_the_filter_with_more_than_its_own_numbers_is_that_of_plain_numpy(wandering, smooth):
+    """All numbers in one matrix, by algebra of matrices: the likelihood to nine digits."""
+    k = K | {"wandering": wandering, "smooth": smooth}
     rng = np.random.default_rng(4)
     rows = np.zeros((300, COMMANDS + 9))
     rows[:, HOLDS] = rng.uniform(0.03, 0.11, 300)
     rows[:, DELIVERED : DELIVERED + 6] = rng.integers(0, 2, (300, 6))
     rows[:, VALUES : VALUES + 6] = rng.normal(0.0, 0.3, (300, 6))
     rows[:, COMMANDS:] = rng.normal(0.0, 1.0, (300, 9))
-    x = np.append(rng.normal(0.0, 0.3, 9), np.zeros(2))
-    P = np.diag([*rng.uniform(1e-3, 4e-2, 9), 0.16, 0.16])
+    x = np.append(rng.normal(0.0, 0.3, 9), np.zeros(5))
+    beside = [0.16 * wandering, 0.25 * wandering, *(smooth * np.array([0.3, 0.2, 0.1]))]
+    P = np.diag([*rng.uniform(1e-3, 4e-2, 9), *beside])
     start = np.zeros(SIZE)
     start[:9], start[9:54] = x[:9], P[:9, :9][np.triu_indices(9)]
-    start[[PLAIN + OWN, PLAIN + OWN + 2]] = 0.16
+    start[[PLAIN + entry(a, a) for a in range(5)]] = beside
     count = int(rows[:, DELIVERED : DELIVERED + 6].sum())
     run = side_by_side(Ideal())(
-        FilterRecord(rows, count), [np.array([K[n] for n in NAMES])], [start], True
+        FilterRecord(rows, count), [np.array([k[n] for n in NAMES])], [start], True
     )
     expected, since = [], 0.0
-    part = K["delay"] / APART
+    part = k["delay"] / APART
     for line in rows:
-        seen = x[:2] + x[9:]
-        x, P, found = corrected(x, P, line, since, K)
+        seen = x[:2] + x[9:11]
+        x, P, found = corrected(x, P, line, since, k)
         expected += found
         early, now, late = line[COMMANDS:].reshape(3, 3).T
         tau = now + 0.5 * part * (late - early) + 0.5 * part**2 * (late - 2.0 * now + early)
-        x, P = marched(x, P, K["thrust"] * tau, line[HOLDS], K)
+        x, P = marched(x, P, k["thrust"] * tau, line[HOLDS], k)
         since += line[HOLDS]
     nu, S = np.array(expected).T
     assert run.innovations[:, 0] == pytest.approx(nu, rel=1e-9, abs=1e-9)

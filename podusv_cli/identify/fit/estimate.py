@@ -75,13 +75,15 @@ class HullSearch:
     """What is searched: `innovations` at points whose prior is normal, with covariance 1.
 
     `blocks` has the part of the logs that every delivered value belongs to. The first `hull`
-    coordinates are numbers of a hull. The second search begins at `second`, if there is one.
+    coordinates are numbers of a hull. The first search begins at `first`, the second at `second`,
+    where these are given.
     """
 
     innovations: Innovations
     size: int
     blocks: Whole
     hull: int = 0
+    first: Vector | None = None
     second: Vector | None = None
 
     def values(self, points: Sequence[Vector]) -> list[float]:
@@ -140,12 +142,12 @@ class HullEstimate:
 def estimate_hull(
     search: HullSearch, tell: Tell = lambda i, value: None, *, starts: int = STARTS
 ) -> HullEstimate:
-    """The best of several searches: from the prior's centre, `second`, then near the better start.
+    """The best of several searches: from `first` or the prior's centre, `second`, then near the better start.
 
     They end when two have come to the same value. An interrupt leaves the best so far. Raises
     UsageError where the filter breaks down at the prior's centre.
     """
-    starts_at = [np.zeros(search.size)]
+    starts_at = [np.zeros(search.size) if search.first is None else search.first]
     found = [_search_from(search, starts_at[0], tell)]
     if not math.isfinite(found[0].value):
         raise UsageError(f"with the vessel as it is given {BREAKS}")

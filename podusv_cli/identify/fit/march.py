@@ -25,11 +25,21 @@ from podusv_cli.core.kernel import LANES, Vector, kernel, scratch, tail, unpacke
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.machine.signatures import LANE_PROTOTYPES, LANE_VECTOR, PROTOTYPES, WHOLE
-from podusv_cli.engine.machine.signatures import VECTOR as PLAIN
+from podusv_cli.engine.machine.signatures import VECTOR as ALONE
 from podusv_cli.engine.running.lanes import room
 from podusv_cli.engine.step.layout import Function, shift_state
-from podusv_cli.identify.fit import wander
-from podusv_cli.identify.fit.wander import ASKED, DEVIATION, LASTING, SIZE, take_in_wandering
+from podusv_cli.identify.fit import beside
+from podusv_cli.identify.fit.beside import (
+    ALL,
+    ASKED,
+    AXES,
+    DEVIATION,
+    LASTING,
+    PLAIN,
+    SIZE,
+    SMOOTH,
+    take_in_beside,
+)
 
 STAGES = 4 * SIZE
 MOST_COMMANDS = 32  # of a row
@@ -43,7 +53,7 @@ CURRENT = ("current_x", "current_y")  # m/s: how fast the water flows north and 
 DELAY = "delay"  # s: how much later than the log says its commands act
 THRUST = "thrust"  # what part of the loads that the actuator's numbers give acts on the hull
 COMPASS = "compass"  # rad: by how much more than the heading it shows
-SENSED = (DEVIATION, LASTING, ASKED, COMPASS)
+SENSED = (DEVIATION, LASTING, SMOOTH, *ASKED, COMPASS)
 # Thrust T of a propeller at n of its full N, over that at N: ((n/N - dead_band)/(1 - dead_band)) to
 # the power thrust_exponent, and 0 within the dead band.
 DEAD_BAND, EXPONENT = "dead_band", "thrust_exponent"
@@ -114,7 +124,7 @@ def seen_from_water(i: int, value: float, since: float, psi: float, k: Any, h: V
 
 @kernel
 def correct_filter(
-    size: int, line: Vector, since: float, state: Vector, k: Any, out: Vector
+    begin: int, end: int, line: Vector, since: float, state: Vector, k: Any, out: Vector
 ) -> int:
     """Take in what a row delivers; write innovation and variance of each value, and count them."""
     sigma, h = scratch(MOVING), scratch(MOVING)
@@ -128,12 +138,12 @@ def correct_filter(
             innovation = value - (state[i] - late)
             if i == 2:
                 innovation = wrap(innovation - k.compass)
-            if size == wander.PLAIN:
+            if begin == end:
                 out[at] = innovation
                 out[at + 1] = take_in(i, h, out[at], sigma[i], state)
             else:
-                out[at] = innovation - (state[wander.PLAIN + i] if i < 2 else 0.0)
-                out[at + 1] = take_in_wandering(i, h, out[at], sigma[i], state)
+                out[at] = innovation - (state[PLAIN + i] if i < AXES else 0.0)
+                out[at + 1] = take_in_beside(begin, end, i, h, out[at], sigma[i], state)
             at += 2
     return at
 
@@ -145,7 +155,8 @@ def filter_rows(
     count: int,
     width: int,
     apart: int,
-    size: int,
+    begin: int,
+    end: int,
     record: Vector,
     full: Vector,
     actuator: Vector,
@@ -157,22 +168,24 @@ def filter_rows(
 ) -> None:
     """The filter along the rows of a record: classical RK4 between them, with commands held.
 
-    Rows of the track are so far `apart`; with 0 the last one alone is left. `size` are the numbers
-    of the state that are used: with the error of positions all of them. `full` has the full n of
-    each command ahead and astern; 0 ahead for what is not bent.
+    Rows of the track are so far `apart`; with 0 the last one alone is left. From `begin` to before
+    `end` is what is followed beside the filter's own numbers. `full` has the full n of each command
+    ahead and astern; 0 ahead for what is not bent.
     """
     k = named(p)
     tau, y, stages, commands = scratch(3), scratch(SIZE), scratch(STAGES), scratch(MOST_COMMANDS)
     at, since, inputs = 0, 0.0, (width - COMMANDS) // 3
-    late = k.delay / APART
+    late, size = k.delay / APART, SIZE if begin < end else PLAIN
+    for i in range(STAGES):  # what is not followed has no rate
+        stages[i] = 0.0
     for row in range(count):
         line = tail(record, row * width)
         for i in range(N):
             track[apart * row + i] = state[i]
-        if size > wander.PLAIN:  # where a receiver sees the boat
-            track[apart * row] += state[wander.PLAIN]
-            track[apart * row + 1] += state[wander.PLAIN + 1]
-        at += correct_filter(size, line, since, state, k, tail(out, at))
+        if begin == 0:  # where a receiver sees the boat
+            track[apart * row] += state[PLAIN]
+            track[apart * row + 1] += state[PLAIN + 1]
+        at += correct_filter(begin, end, line, since, state, k, tail(out, at))
         for i in range(inputs):  # the parabola through the three
             shifts = tail(line, COMMANDS + 3 * i)
             commands[i] = shifts[1] + 0.5 * late * (shifts[2] - shifts[0])
@@ -194,12 +207,12 @@ def filter_rows(
             state[i] += h / 6.0 * (stages[i] + 2.0 * between + stages[3 * SIZE + i])
 
 
-FILTERED = (PROTOTYPES["actuator"], PROTOTYPES["follow"], *[WHOLE] * 4, *[PLAIN] * 8)
+FILTERED = (PROTOTYPES["actuator"], PROTOTYPES["follow"], *[WHOLE] * 5, *[ALONE] * 8)
 FILTERED_LANES = (
     LANE_PROTOTYPES["actuator"],
     LANE_PROTOTYPES["follow"],
-    *[WHOLE] * 4,
-    *[PLAIN] * 2,
+    *[WHOLE] * 5,
+    *[ALONE] * 2,
     *[LANE_VECTOR] * 6,
 )
 
@@ -211,14 +224,14 @@ def pieces(actuator: Actuator) -> list[Any]:
     """The three pieces to compile for the filter along a log of this actuator's commands.
 
     They are the actuator's loads, the hull's `follow` and the march, `filter_rows`. All lanes have
-    one actuator, so its constants are equal in all; of the hull's constants only ASKED is.
+    one actuator, so its constants are equal in all; of the hull's constants only ASKED are.
     """
     from podusv_cli.engine.machine import compile
 
     names = tuple(actuator.constants())
     return [
         compile.lane_adapter("actuator", actuator.replay, names, frozenset(names)),
-        compile.lane_adapter("follow", wander.follow, NAMES, frozenset({ASKED})),
+        compile.lane_adapter("follow", beside.follow, NAMES, frozenset(ASKED)),
         compile.Piece(filter_rows, CFUNCTYPE(None, *FILTERED_LANES), "", compile.LANES_BY),
     ]
 
@@ -246,6 +259,7 @@ def side_by_side(actuator: Actuator, *, bent: bool = False) -> Follow:
     ) -> Followed:
         """Follow a record, each run in a lane."""
         count, width = record.rows.shape
+        wandering, smooth = (constants[0][NAMES.index(name)] for name in ASKED)
         rows, apart = (count, N) if tracked else (1, 0)
         out, track = room(2 * record.delivered * LANES), room(N * rows * LANES)
         p, state = _in_lanes(constants), _in_lanes(starts)
@@ -255,7 +269,8 @@ def side_by_side(actuator: Actuator, *, bent: bool = False) -> Follow:
             count,
             width,
             apart,
-            SIZE if constants[0][NAMES.index(ASKED)] else wander.PLAIN,
+            0 if wandering else AXES,
+            ALL if smooth else AXES,
             signatures.pointer(record.rows),
             signatures.pointer(full),
             *[signatures.pointer(v, LANE_VECTOR) for v in (a, table, p, state, out, track)],

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -17,6 +17,17 @@ from podusv_cli.components.facts import Facts
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import LANES, Vector
+from podusv_cli.identify.fit.beside import (
+    ALL,
+    ASKED,
+    AXES,
+    DEVIATION,
+    LASTING,
+    PLAIN,
+    SIZE,
+    SMOOTH,
+    entry,
+)
 from podusv_cli.identify.fit.estimate import HullSearch
 from podusv_cli.identify.fit.march import (
     COMPASS,
@@ -44,7 +55,6 @@ from podusv_cli.identify.fit.numbers import (
 )
 from podusv_cli.identify.fit.records import FilterLog
 from podusv_cli.identify.fit.sensing import USUAL, Wandering, position_wandering, sensor_noise
-from podusv_cli.identify.fit.wander import ASKED, DEVIATION, LASTING, OWN, PLAIN, SIZE
 from podusv_cli.identify.logs.reading import Whole
 from podusv_cli.process.workers import available_workers
 from podusv_cli.scenario.identify import COMPASS_OFF, THRUST_CURVE, WANDER, Identify
@@ -64,6 +74,7 @@ AT_START = (0.2, 0.1, 0.05)  # m/s, m/s, rad/s: the same of the velocities at th
 FIRST = ("first u", "first v", "first load_x", "first load_y", "first load_psi")
 TURNED = 0.05  # rad, of the heading at the start
 FORGETS = 1.0  # of the logarithm of the time in which a position's error forgets
+CHANGES = 1.0  # s, how long a smooth load of the model ship takes to change; of its logarithm, too
 FLOWING = 0.1  # of the speed at full thrust: a current that nothing is known of
 BLOCK = 30.0  # s of a log, whose innovations count together
 
@@ -78,6 +89,7 @@ class FitProblem:
     scenario: Scenario
     wanted: Identify
     logs: Sequence[FilterLog]
+    smooth: bool = False  # whether loads are
 
     @cached_property
     def facts(self) -> Facts:
@@ -125,6 +137,15 @@ class FitProblem:
         return [*own, FreeNumber(LASTING, USUAL, FORGETS)]
 
     @cached_property
+    def _smoothness(self) -> list[FreeNumber]:
+        """T_b of loads that are smooth; one below a step of the filter could not be followed."""
+        if not self.smooth:
+            return []
+        usual = CHANGES * math.sqrt(self.facts.lam)
+        shortest = math.log(self.wanted.step / usual) / CHANGES
+        return [FreeNumber(SMOOTH, usual, CHANGES, least=shortest)]
+
+    @cached_property
     def hull(self) -> list[FreeNumber]:
         """The hull's numbers that are looked for, and those of the thrust.
 
@@ -149,7 +170,7 @@ class FitProblem:
         guessed = [name for name in self._sensor_deviations if name not in self.wanted.noise]
         noises = [FreeNumber(n, getattr(self.filter, n), UNSURE, least=LEAST) for n in guessed]
         noises += [FreeNumber(n, getattr(self.filter, n), UNSURE) for n in WALKS]
-        noises += self._position
+        noises += [*self._position, *self._smoothness]
         own = {**dict.fromkeys(CURRENT if self.current else (), self.current), **self._first}
         each = [
             FreeNumber(f"{name}, {log.name}", 0.0, sd, ratio=False)
@@ -184,7 +205,8 @@ class FitProblem:
         """The filter's constants before anything is looked for, in the order of `NAMES`."""
         still = {THRUST: 1.0, EXPONENT: SQUARE}
         still |= dict.fromkeys((DEAD_BAND, DELAY, COMPASS, *CURRENT), 0.0)
-        still |= {ASKED: float(self.wander > 0.0), DEVIATION: self.wander, LASTING: USUAL}
+        still |= {DEVIATION: self.wander, LASTING: USUAL, SMOOTH: 1.0}
+        still |= dict(zip(ASKED, (float(self.wander > 0.0), float(self.smooth)), strict=True))
         known = self.scenario.vessel.constants() | self.filter.constants() | still
         return np.array([known[name] for name in NAMES])
 
@@ -300,7 +322,11 @@ class FitProblem:
         state[3:5] += first[:2]
         unsure = np.diag(np.square([pose, pose, TURNED, *speeds, *loads]))
         beside = np.zeros(SIZE - N - PACKED)
-        beside[[PLAIN - N - PACKED + OWN, -1]] = wander * wander  # of the error, north and east
+        own = [PLAIN - N - PACKED + entry(a, a) for a in range(ALL)]
+        beside[own[:AXES]] = wander * wander  # of the error, north and east
+        if self.smooth:
+            q, q_psi, T_b = (values[self._places[n]] for n in (*WALKS[3:], SMOOTH))
+            beside[own[AXES:]] = np.square([q, q, q_psi]) / (2.0 * T_b)
         return np.concatenate([state, first[2:], unsure[np.triu_indices(N)], beside])
 
     def follow(
@@ -366,7 +392,12 @@ class FitProblem:
         A hull far from the boat's explains a log badly, and one that is trusted is stuck there.
         """
         loud = np.array([LOUD * (number.name in WALKS) for number in self.numbers])
-        return HullSearch(self.innovations, len(loud), self.blocks, len(self.hull), loud)
+        return HullSearch(self.innovations, len(loud), self.blocks, len(self.hull), second=loud)
+
+    def search_from(self, before: Mapping[str, float]) -> HullSearch:
+        """What is searched, the first time from numbers in units of their priors, by name."""
+        first = np.array([before.get(number.name, 0.0) for number in self.numbers])
+        return replace(self.search, first=first)
 
     @cached_property
     def blocks(self) -> Whole:
