@@ -208,9 +208,9 @@ def make_set(number: int) -> list[dict[str, Any]]:
         lines = [*numbers_beside_truth(answer, boat), *forces_beside_truth(answer, boat)]
     except (UsageError, ValidationError, np.linalg.LinAlgError) as error:
         return [asdict(cell) | {"what": "none", "name": str(error)}]
-    found, wander = answer.estimate, answer.problem.wander
+    found, problem = answer.estimate, answer.problem
     of = {"settled": found.settled, "refused": bool(answer.refused_by), "rounds": found.rounds}
-    of |= {"wander": wander, "cpu": time.process_time() - begun}
+    of |= {"wander": problem.wander, "gusts": problem.gusts, "cpu": time.process_time() - begun}
     return [asdict(cell) | line | of for line in lines]
 
 

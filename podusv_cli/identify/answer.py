@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,11 +18,11 @@ from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_mom
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.signal import STATE
 from podusv_cli.identify.fit.estimate import Directions, HullEstimate
 from podusv_cli.identify.fit.march import CURVE, THRUST
-from podusv_cli.identify.fit.problem import FitProblem
+from podusv_cli.identify.fit.problem import FitProblem, channels
 from podusv_cli.identify.fit.records import FilterLog
-from podusv_cli.identify.fit.whiteness import Whiteness, whiteness_of
 from podusv_cli.identify.judge import FreeRun, Score, decisive, scores_worse_than_prior
 
 SIDE = 1.959964  # standard deviations to either end of an interval that holds 95 %
@@ -98,6 +98,20 @@ class ForceCurve:
     after: Vector
     before: Vector
     covered: Vector
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """Innovations of a sensor along a log: mean square over variance, and how like the one before.
+
+    Both say where the model is wrong: the first is 1 and the second 0 where it is right.
+    """
+
+    log: str
+    measured: str
+    count: int
+    nis: float
+    correlation: float
 
 
 @dataclass(frozen=True)
@@ -280,4 +294,15 @@ class Identification:
     @cached_property
     def whiteness(self) -> list[Whiteness]:
         """Of every sensor along every log."""
-        return whiteness_of(self.problem, self.estimate.y)
+        return [w for log in self.problem.logs for w in self._whiteness(log)]
+
+    def _whiteness(self, log: FilterLog) -> Iterator[Whiteness]:
+        """Of the sensors along a log that deliver enough values to tell."""
+        followed = self.problem.follow(log, [self.estimate.y])
+        normal = followed.innovations[:, 0] / np.sqrt(followed.variances[:, 0])
+        of = channels(log)
+        for i, signal in enumerate(STATE):
+            own = normal[of == i][5:]
+            if len(own) > 10:
+                alike = float(np.mean(own[1:] * own[:-1]) / np.mean(own**2))
+                yield Whiteness(log.name, signal.name, len(own), float(np.mean(own**2)), alike)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from podusv_cli.identify.answer import Identification
+import math
+
+from podusv_cli.identify.answer import Identification, Whiteness
 from podusv_cli.identify.fit.march import DEAD_BAND, DELAY, EXPONENT, THRUST
 from podusv_cli.identify.judge import scores_worse_than_prior
 
 FAR = 3.0  # prior standard deviations, beyond which a number contradicts what was known
 LARGE = 2.0  # prior standard deviations, beyond which a noise or a walk has taken up something else
+ALIKE = 0.2  # correlation of an innovation with the one before, from which on it is said
+CHANCE = 4.0  # over the root of their number: a correlation that white innovations hardly have
 NAMED = 4  # of them
 SENSOR = (
     "the sensor is off by more than its values differ from one to the next, as where it wanders or "
@@ -74,7 +78,7 @@ def loud_words(answer: Identification) -> list[str]:
 
 def correlation_words(answer: Identification) -> list[str]:
     """A sentence where a sensor's innovations along a log are alike from one to the next."""
-    alike = sorted((w for w in answer.whiteness if not w.is_white), key=lambda w: -abs(w.correlation))
+    alike = sorted(filter(_is_alike, answer.whiteness), key=lambda w: -abs(w.correlation))
     if not alike:
         return []
     named = [f"{w.measured} of {w.log} {w.correlation:.2g}" for w in alike[:NAMED]]
@@ -84,6 +88,11 @@ def correlation_words(answer: Identification) -> list[str]:
         f"explain: {', '.join(named)}{more}. Model or noise is not right there, and intervals may "
         "be too narrow."
     ]
+
+
+def _is_alike(w: Whiteness) -> bool:
+    """Whether innovations are correlated by more than chance makes them."""
+    return abs(w.correlation) > max(ALIKE, CHANCE / math.sqrt(w.count))
 
 
 def worse_words(answer: Identification) -> list[str]:

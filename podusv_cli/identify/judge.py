@@ -102,40 +102,40 @@ def _free_run(problem: FitProblem, log: FilterLog, y: Vector, first: int) -> Fre
     rows[first:, DELIVERED : DELIVERED + MOVING] = 0.0
     cut = log.of(rows)
     points = [y, problem.before(y)]
-    currents = [_current(problem, cut.until(first), point) for point in points]
-    track = problem.follow(cut, points, currents).track[first:]
+    seas = [_sea(problem, cut.until(first), point) for point in points]
+    track = problem.follow(cut, points, seas).track[first:]
     measured = np.where(
         log.record.rows[first:, DELIVERED : DELIVERED + 3] != 0.0,
         log.record.rows[first:, VALUES : VALUES + 3],
         np.nan,
     )
     times = log.times[first:]
-    drift = (times - times[0])[:, None] * np.array([*currents[0], 0.0])
+    drift = (times - times[0])[:, None] * np.array([*seas[0][:2], 0.0])
     still = _turning(times, track[0, :, 0]) + drift
     return FreeRun(times, measured, (track[:, :3, 0], track[:, :3, 1], still))
 
 
-def _current(problem: FitProblem, log: FilterLog, y: Vector) -> list[float]:
-    """The current that a hull sees along a log [m/s], as far as the log determines it.
+def _sea(problem: FitProblem, log: FilterLog, y: Vector) -> list[float]:
+    """The sea that a hull meets along a log, as `FitProblem.sea`, as far as the log determines it.
 
     On a straight track a current along it is the same as a load, and is left to that. An
     interrupt ends it.
     """
-    if not problem.current:
-        return [0.0, 0.0]
+    sizes = problem.sea
+    if not sizes.any():
+        return [0.0] * len(sizes)
 
     def innovations(points: Sequence[Vector]) -> tuple[Vector, Vector]:
-        currents = [list(problem.current * e) for e in points]
-        followed = problem.follow(log, [y] * len(points), currents)
+        followed = problem.follow(log, [y] * len(points), [list(sizes * e) for e in points])
         return followed.innovations, followed.variances
 
     blocks = np.zeros(log.record.delivered, np.int64)
-    found = estimate_hull(HullSearch(innovations, 2, blocks), starts=1)
+    found = estimate_hull(HullSearch(innovations, len(sizes), blocks), starts=1)
     if found.interrupted:
         raise KeyboardInterrupt
-    ways = directions(found.covariance, 2)
+    ways = directions(found.covariance, len(sizes))
     determined = ways.basis[:, : ways.determined_count]
-    return list(problem.current * (determined @ (determined.T @ found.y)))
+    return list(sizes * (determined @ (determined.T @ found.y)))
 
 
 def _turning(times: Vector, state: Vector) -> Vector:

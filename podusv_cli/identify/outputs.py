@@ -16,9 +16,10 @@ from podusv_cli.core.escaping import visible
 from podusv_cli.core.phrases import value_text
 from podusv_cli.core.recording import Status
 from podusv_cli.identify.answer import AXES, Force, Identification
+from podusv_cli.identify.fit.beside import DEVIATION, LASTING, RATE, SWINGS
 from podusv_cli.identify.fit.estimate import OPEN, SILENT
 from podusv_cli.identify.fit.march import COMPASS, CURRENT, CURVE, DELAY, THRUST
-from podusv_cli.identify.fit.beside import DEVIATION, LASTING
+from podusv_cli.identify.fit.problem import FIRST_LOADS, MEAN_LOADS
 from podusv_cli.identify.judge import WHO, Score
 from podusv_cli.identify.phrases import open_words, summary
 from podusv_cli.pages.page import Picture, environment, flat
@@ -49,9 +50,9 @@ OTHERS = {
     **dict.fromkeys(CURRENT, "m/s"),
     "first u": "m/s",
     "first v": "m/s",
-    "first load_x": "N",
-    "first load_y": "N",
-    "first load_psi": "N m",
+    RATE: "rad/s",
+    SWINGS: "1",
+    **dict(zip((*FIRST_LOADS, *MEAN_LOADS), ("N", "N", "N m") * 2, strict=True)),
 }
 
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from podusv_cli.identify.answer import AXES, Identification, Parameter
+from podusv_cli.identify.fit.beside import DEVIATION, LASTING
 from podusv_cli.identify.fit.estimate import OPEN
 from podusv_cli.identify.fit.march import COMPASS
-from podusv_cli.identify.fit.beside import DEVIATION, LASTING
 from podusv_cli.identify.judge import SHOWN, WHO
 from podusv_cli.scenario.identify import WANDER
 

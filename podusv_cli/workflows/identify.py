@@ -12,10 +12,9 @@ from podusv_cli.identify import outputs
 from podusv_cli.identify.answer import Identification
 from podusv_cli.identify.doubts import list_doubts, refusal
 from podusv_cli.identify.fit import estimate
-from podusv_cli.identify.fit.estimate import HullEstimate
+from podusv_cli.identify.fit.gusts import estimate_in_sea
 from podusv_cli.identify.fit.problem import FitProblem
 from podusv_cli.identify.fit.records import FilterLog
-from podusv_cli.identify.fit.whiteness import whiteness_of
 from podusv_cli.identify.intake import logs_of
 from podusv_cli.identify.judge import FreeRun, free_runs, scores
 from podusv_cli.identify.logs.contents import LogFault
@@ -30,7 +29,6 @@ from podusv_cli.workflows.request import Request
 from podusv_cli.workflows.run import RESULTS, open_scenario, writer_of
 
 Progress = Callable[[str, float], None]
-BETTER = 10.0  # in -2 log of the posterior: what one more number has to gain
 SETTLES = 30  # rounds, after which a search has usually settled
 
 
@@ -106,7 +104,8 @@ def answer_logs(
         if progress:
             progress(f"fitting, round {i}", min(i / SETTLES, 0.99))
 
-    problem, found = search_hull(problem, tell)
+    problem, best = estimate_in_sea(problem, tell)
+    found = estimate.prior_kept(problem.search, best, tell)
     ways = estimate.directions(found.covariance, len(problem.hull))
     judged: list[tuple[FilterLog, str, Sequence[FreeRun]]] = [(log, role, ()) for log, role in logs]
     try:
@@ -116,18 +115,3 @@ def answer_logs(
         found = replace(found, interrupted=True)
     marks = [score for log, role, runs in judged for score in scores(log, role, runs)]
     return Identification(problem, found, ways, judged, marks)
-
-
-def search_hull(problem: FitProblem, tell: estimate.Tell) -> tuple[FitProblem, HullEstimate]:
-    """The best numbers, and what they were looked for in: with smooth loads where those are better.
-
-    They are tried where innovations are not white: they say that the filter's loads are no good.
-    """
-    found = estimate.estimate_hull(problem.search, tell)
-    if not found.interrupted and not all(w.is_white for w in whiteness_of(problem, found.y)):
-        smooth = replace(problem, smooth=True)
-        named = zip((number.name for number in problem.numbers), found.y.tolist(), strict=True)
-        again = estimate.estimate_hull(smooth.search_from(dict(named)), tell)
-        if again.value < found.value - BETTER:
-            problem, found = smooth, again
-    return problem, estimate.prior_kept(problem.search, found, tell)

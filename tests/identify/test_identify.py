@@ -32,6 +32,7 @@ from podusv_cli.core.kernel import LANES, bundle
 from podusv_cli.identify import judge
 from podusv_cli.identify.answer import Identification
 from podusv_cli.identify.doubts import early_words, thrust_words, worse_words
+from podusv_cli.identify.fit.beside import SIZE
 from podusv_cli.identify.fit.estimate import OPEN, SILENT, HullEstimate, directions
 from podusv_cli.identify.fit.march import (
     APART,
@@ -45,7 +46,6 @@ from podusv_cli.identify.fit.march import (
 )
 from podusv_cli.identify.fit.problem import FitProblem, hull_numbers
 from podusv_cli.identify.fit.records import log_of
-from podusv_cli.identify.fit.beside import SIZE
 from podusv_cli.identify.logs.reading import LogTable, mark_new_values
 from podusv_cli.identify.outputs import rows_of_draws
 from podusv_cli.identify.phrases import summary
@@ -81,7 +81,8 @@ def test_the_filter_along_a_log_is_that_of_plain_python():
         **dict.fromkeys(("Y_rv", "Y_vr", "N_rv", "N_vr"), 0.0),  # whose slopes are means
         "current_x": current[0],
         "current_y": current[1],
-        **{"s_g": 0.0, "T_g": 30.0, "T_b": 1.0, "wandering": 0.0, "smooth": 0.0, "compass": 0.0},
+        **{"s_g": 0.0, "T_g": 30.0, "wandering": 0.0, "compass": 0.0},
+        **{"mean_x": 0.0, "mean_y": 0.0, "mean_psi": 0.0, "w_b": 1.0, "z_b": 1.0, "gusts": 0.0},
     }
     rows[:, COMMANDS:] = rng.normal(0.0, 1.0, (12, 9))
     size, moving = 9, np.array([0.9, 0.4, 0.5])

@@ -15,6 +15,7 @@ from benchmarks import plain_logs
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.identify.answer import Identification
+from podusv_cli.identify.fit.beside import PLAIN, SIZE, entry
 from podusv_cli.identify.fit.estimate import HullEstimate, directions
 from podusv_cli.identify.fit.march import (
     APART,
@@ -28,7 +29,6 @@ from podusv_cli.identify.fit.march import (
 )
 from podusv_cli.identify.fit.records import log_of
 from podusv_cli.identify.fit.sensing import position_wandering
-from podusv_cli.identify.fit.beside import PLAIN, SIZE, entry
 from podusv_cli.identify.phrases import summary
 
 K = {
@@ -42,7 +42,8 @@ K = {
         "current_x": 0.2,
         "current_y": -0.1,
     },
-    **{"s_g": 0.4, "T_g": 3.7, "T_b": 0.9, "compass": 0.08},
+    **{"mean_x": 0.7, "mean_y": -0.4, "mean_psi": 0.2},
+    **{"s_g": 0.4, "T_g": 3.7, "w_b": 1.9, "z_b": 0.3, "compass": 0.08},
 }
 
 
@@ -81,9 +82,11 @@ def rates_and_slopes(x, P, tau, k):
     f = np.zeros(14)
     f[:3] = R @ nu
     f[3:6] = np.linalg.solve(M, k["coriolis"] * coriolis + D @ nu + tau + R.T @ x[6:9])
-    f[6:9] = k["smooth"] * x[11:]
+    f[6:9] = k["gusts"] * x[11:]
     f[9:11] = -x[9:11] / k["T_g"]
-    f[11:] = -x[11:] / k["T_b"]
+    means = np.array([k["mean_x"], k["mean_y"], k["mean_psi"]])
+    fades, stiff = 2.0 * k["z_b"] * k["w_b"], k["gusts"] * k["w_b"] ** 2
+    f[11:] = -fades * x[11:] - stiff * (x[6:9] - means)
     sv, sr = mean_sign(v, P[4, 4]), mean_sign(r, P[5, 5])
     by_nu = D.copy()
     by_nu[0, 0] += k["X_uu"] * abs(u) + 2.0 * k["X_uuu"] * u * u
@@ -105,9 +108,9 @@ def rates_and_slopes(x, P, tau, k):
     turned = np.array([[-s, c, 0], [-c, -s, 0], [0, 0, 0]])
     F[3:6, 2] = np.linalg.solve(M, turned @ x[6:9])
     F[3:6, 6:9] = np.linalg.solve(M, R.T)
-    F[6:9, 11:] = k["smooth"] * np.eye(3)
+    F[6:9, 11:], F[11:, 6:9] = k["gusts"] * np.eye(3), -stiff * np.eye(3)
     F[9:11, 9:11] = -np.eye(2) / k["T_g"]
-    F[11:, 11:] = -np.eye(3) / k["T_b"]
+    F[11:, 11:] = -fades * np.eye(3)
     return f, F
 
 
@@ -118,7 +121,7 @@ def marched(x, P, tau, h, k):
         for names in (("q_u", "q_v", "q_r"), ("q_b", "q_b", "q_b_psi"))
     )
     loads = np.array(loads[0])
-    walks, rates = loads * (1.0 - k["smooth"]), loads * k["smooth"] / k["T_b"] ** 2
+    walks, rates = loads * (1.0 - k["gusts"]), loads * k["gusts"] * k["w_b"] ** 2
     errors = [2.0 * k["wandering"] * k["s_g"] ** 2 / k["T_g"]] * 2
     Q = np.diag([0.0, 0.0, 0.0, *moving, *walks, *errors, *rates])
 
@@ -163,10 +166,10 @@ def corrected(x, P, line, since, k):
     return x, P, found
 
 
-@pytest.mark.parametrize(("wandering", "smooth"), [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)])
-def test_the_filter_with_more_than_its_own_numbers_is_that_of_plain_numpy(wandering, smooth):
+@pytest.mark.parametrize(("wandering", "gusts"), [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)])
+def test_the_filter_with_more_than_its_own_numbers_is_that_of_plain_numpy(wandering, gusts):
     """All numbers in one matrix, by algebra of matrices: the likelihood to nine digits."""
-    k = K | {"wandering": wandering, "smooth": smooth}
+    k = K | {"wandering": wandering, "gusts": gusts}
     rng = np.random.default_rng(4)
     rows = np.zeros((300, COMMANDS + 9))
     rows[:, HOLDS] = rng.uniform(0.03, 0.11, 300)
@@ -174,7 +177,7 @@ def test_the_filter_with_more_than_its_own_numbers_is_that_of_plain_numpy(wander
     rows[:, VALUES : VALUES + 6] = rng.normal(0.0, 0.3, (300, 6))
     rows[:, COMMANDS:] = rng.normal(0.0, 1.0, (300, 9))
     x = np.append(rng.normal(0.0, 0.3, 9), np.zeros(5))
-    beside = [0.16 * wandering, 0.25 * wandering, *(smooth * np.array([0.3, 0.2, 0.1]))]
+    beside = [0.16 * wandering, 0.25 * wandering, *(gusts * np.array([0.3, 0.2, 0.1]))]
     P = np.diag([*rng.uniform(1e-3, 4e-2, 9), *beside])
     start = np.zeros(SIZE)
     start[:9], start[9:54] = x[:9], P[:9, :9][np.triu_indices(9)]

@@ -4,22 +4,25 @@ Errors of positions, north and east apart, are first-order Gauss-Markov processe
 
     g' = -g/T_g + w,   E g^2 = s_g^2,   z = (x, y) + g + white error,
 
-and a load, north, east and about the vertical, that is smooth has a rate c of that kind,
+and a load of gusts, north, east and about the vertical, swings about its mean B,
 
-    b' = c,   c' = -c/T_b + w,   E c^2 = q_b^2/(2 T_b).
+    b' = c,   c' = -2 z_b w_b c - w_b^2 (b - B) + w,
+    E c^2 = w_b^2 E (b - B)^2 = q_b^2 w_b/(4 z_b).
 
-Slower than T_b such a load is the Wiener process of `components.estimators.ekf`; faster, where that
-one has the power (q_b/w)^2 at a rate w [rad/s], it has (q_b/w)^2/(1 + (w T_b)^2). A filter that
-expects the first of a load without fast parts takes what the load does for the hull's damping.
+Where the Wiener process of `components.estimators.ekf` has the power (q_b/w)^2 at w rad/s, this one
+has (q_b/w_b)^2/((1 - w^2/w_b^2)^2 + (2 z_b w/w_b)^2), about even below w_b and hardly any above. A
+filter that expects the first of gusts takes a part of what they do for the hull's damping.
 
 With e = (g, c) and F and P of the filter's own nine numbers, the covariance C between these and e,
-that of e, G, and the diagonals D and W of what forgets and of what is new,
+that of e, G, the diagonals D and W of what forgets and of what is new, and K of w_b^2,
 
-    P' = F P + P F^T + E C^T + C E^T + Q,   C' = F C + E G - C D,   G' = W - D G - G D,
+    P' = F P + P F^T + E C^T + C E^T + Q,   C' = F C + E G - C D - P E K,
+    G' = W - D G - G D - K E^T C - C^T E K,
 
 where E is 1 from c to its b, and nothing but c moves b. A position's derivative is h for the nine
-and 1 for its own g. Source: A. Gelb (ed.), "Applied Optimal Estimation", MIT Press 1974, ch. 3
-(Markov processes, state augmentation), table 6.1-1.
+and 1 for its own g. Sources: A. Gelb (ed.), "Applied Optimal Estimation", MIT Press 1974, ch. 3
+(Markov processes, state augmentation), table 6.1-1; the second-order process is that of the linear
+wave model, T. I. Fossen, "Handbook of Marine Craft Hydrodynamics and Motion Control", 2011, 8.2.6.
 """
 
 from __future__ import annotations
@@ -34,8 +37,8 @@ AXES, ALL = 2, 5  # of e: g north and east, then c north, east and about the ver
 CROSS, OWN = ALL, ALL + ALL * N  # behind these: C by rows, then G's upper triangle by rows
 SIZE = PLAIN + OWN + ALL * (ALL + 1) // 2
 DEVIATION, LASTING = "s_g", "T_g"  # m, s
-SMOOTH = "T_b"  # s
-ASKED = ("wandering", "smooth")  # 1 where the filter follows g and where c, alike in all lanes
+RATE, SWINGS = "w_b", "z_b"  # rad/s, 1
+ASKED = ("wandering", "gusts")  # 1 where the filter follows g and where c, alike in all lanes
 
 
 @kernel
@@ -47,7 +50,7 @@ def entry(a: int, b: int) -> int:
 @kernel
 def forgetting(a: int, k: Any) -> float:
     """D of one of e [1/s]."""
-    return float(1.0 / k.T_g if a < AXES else 1.0 / k.T_b)
+    return float(1.0 / k.T_g if a < AXES else 2.0 * k.z_b * k.w_b)
 
 
 @kernel
@@ -56,15 +59,16 @@ def renewal(a: int, k: Any) -> float:
     if a < AXES:
         return float(2.0 * (1.0 / k.T_g) * k.s_g * k.s_g)
     q = k.q_b_psi if a == ALL - 1 else k.q_b
-    return float(q * q / (k.T_b * k.T_b))
+    return float(q * q * k.w_b * k.w_b)
 
 
 @kernel
-def spread_beside(begin: int, end: int, f: Vector, e: Vector, k: Any, rate: Vector) -> None:
-    """Rates of e, C and G, of those of e from `begin` to before `end`."""
+def spread_beside(begin: int, end: int, f: Vector, state: Vector, k: Any, rate: Vector) -> None:
+    """Rates of e, C and G, of those of e from `begin` to before `end`, as if nothing swung."""
+    e, to = tail(state, PLAIN), tail(rate, PLAIN)
     for a in range(begin, end):
         fade = forgetting(a, k)
-        rate[a] = -fade * e[a]
+        to[a] = -fade * e[a]
         for i in range(N):
             total = -fade * e[CROSS + ALL * i + a]
             if i < MOVING:
@@ -73,11 +77,28 @@ def spread_beside(begin: int, end: int, f: Vector, e: Vector, k: Any, rate: Vect
             elif end == ALL:
                 moved = AXES + i - MOVING
                 total += e[entry(a, moved) if a < moved else entry(moved, a)]
-            rate[CROSS + ALL * i + a] = total
+            to[CROSS + ALL * i + a] = total
         for b in range(a, end):
             at = entry(a, b)
-            rate[at] = -(fade + forgetting(b, k)) * e[at]
-        rate[entry(a, a)] += renewal(a, k)
+            to[at] = -(fade + forgetting(b, k)) * e[at]
+        to[entry(a, a)] += renewal(a, k)
+
+
+@kernel
+def swing(begin: int, state: Vector, k: Any, rate: Vector) -> None:
+    """What w_b^2 (b - B) adds to the rates of c, C and G."""
+    full, e, to = scratch(81), tail(state, PLAIN), tail(rate, PLAIN)
+    unpack_triangle(tail(state, N), full)
+    stiff = k.w_b * k.w_b
+    for c in range(ALL - AXES):
+        a, load = AXES + c, MOVING + c
+        mean = k.mean_x if c == 0 else (k.mean_y if c == 1 else k.mean_psi)
+        to[a] -= stiff * (state[load] - mean)
+        for i in range(N):
+            to[CROSS + ALL * i + a] -= stiff * full[N * i + load]
+        for b in range(begin, ALL):
+            at = entry(b, a) if b < a else entry(a, b)
+            to[at] -= stiff * e[CROSS + ALL * load + b] * (2.0 if a == b else 1.0)
 
 
 @kernel
@@ -102,10 +123,11 @@ def follow(tau: Vector, state: Vector, k: Any, rate: Vector) -> None:
     """The filter between deliveries, and what is asked for beside it."""
     f = scratch(54)
     predict(tau, state, k, f, rate)
-    begin, end = 0 if k.wandering != 0.0 else AXES, ALL if k.smooth != 0.0 else AXES
+    begin, end = 0 if k.wandering != 0.0 else AXES, ALL if k.gusts != 0.0 else AXES
     if begin < end:
-        spread_beside(begin, end, f, tail(state, PLAIN), k, tail(rate, PLAIN))
+        spread_beside(begin, end, f, state, k, rate)
     if end == ALL:
+        swing(begin, state, k, rate)
         move_loads(tail(state, PLAIN), rate)
 
 

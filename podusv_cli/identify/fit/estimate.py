@@ -142,9 +142,9 @@ class HullEstimate:
 def estimate_hull(
     search: HullSearch, tell: Tell = lambda i, value: None, *, starts: int = STARTS
 ) -> HullEstimate:
-    """The best of several searches: from `first` or the prior's centre, `second`, then near the better start.
+    """The best of several searches: from the prior's centre or `first`, `second`, then elsewhere.
 
-    They end when two have come to the same value. An interrupt leaves the best so far. Raises
+    The others begin near the better start. They end when two have come to the same value. An interrupt leaves the best so far. Raises
     UsageError where the filter breaks down at the prior's centre.
     """
     starts_at = [np.zeros(search.size) if search.first is None else search.first]

@@ -36,8 +36,9 @@ from podusv_cli.identify.fit.beside import (
     DEVIATION,
     LASTING,
     PLAIN,
+    RATE,
     SIZE,
-    SMOOTH,
+    SWINGS,
     take_in_beside,
 )
 
@@ -50,10 +51,13 @@ SHIFTS, APART = (-1.0, 0.0, 1.0), 0.1
 TINY = 1e-12  # of full n: no thrust
 SIGMAS = ("sigma_p", "sigma_p", "sigma_psi", "sigma_u", "sigma_v", "sigma_r")
 CURRENT = ("current_x", "current_y")  # m/s: how fast the water flows north and east
+MEAN = ("mean_x", "mean_y", "mean_psi")  # N, N, N m: the load about which gusts swing
+SEA = (*CURRENT, *MEAN)  # of a log alone
+GUSTS = (RATE, SWINGS)
 DELAY = "delay"  # s: how much later than the log says its commands act
 THRUST = "thrust"  # what part of the loads that the actuator's numbers give acts on the hull
 COMPASS = "compass"  # rad: by how much more than the heading it shows
-SENSED = (DEVIATION, LASTING, SMOOTH, *ASKED, COMPASS)
+SENSED = (DEVIATION, LASTING, *ASKED, COMPASS)
 # Thrust T of a propeller at n of its full N, over that at N: ((n/N - dead_band)/(1 - dead_band)) to
 # the power thrust_exponent, and 0 within the dead band.
 DEAD_BAND, EXPONENT = "dead_band", "thrust_exponent"
@@ -61,7 +65,7 @@ CURVE = (DEAD_BAND, EXPONENT)
 SQUARE = 2.0  # the exponent under which a propeller's thrust is as the actuator's numbers give it
 NAMES = (
     *(*COEFFICIENTS, *ExtendedKalmanFilter().constants()),
-    *(THRUST, *CURVE, DELAY, *CURRENT, *SENSED),
+    *(THRUST, *CURVE, DELAY, *SEA, *GUSTS, *SENSED),
 )
 named = unpacker(NAMES)
 
@@ -149,6 +153,13 @@ def correct_filter(
 
 
 @kernel
+def clear(count: int, numbers: Vector) -> None:
+    """Numbers that are 0."""
+    for i in range(count):
+        numbers[i] = 0.0
+
+
+@kernel
 def filter_rows(
     loads: Function,
     follow: Function,
@@ -176,8 +187,7 @@ def filter_rows(
     tau, y, stages, commands = scratch(3), scratch(SIZE), scratch(STAGES), scratch(MOST_COMMANDS)
     at, since, inputs = 0, 0.0, (width - COMMANDS) // 3
     late, size = k.delay / APART, SIZE if begin < end else PLAIN
-    for i in range(STAGES):  # what is not followed has no rate
-        stages[i] = 0.0
+    clear(STAGES, stages)  # what is not followed has no rate
     for row in range(count):
         line = tail(record, row * width)
         for i in range(N):
@@ -259,7 +269,7 @@ def side_by_side(actuator: Actuator, *, bent: bool = False) -> Follow:
     ) -> Followed:
         """Follow a record, each run in a lane."""
         count, width = record.rows.shape
-        wandering, smooth = (constants[0][NAMES.index(name)] for name in ASKED)
+        wandering, gusts = (constants[0][NAMES.index(name)] for name in ASKED)
         rows, apart = (count, N) if tracked else (1, 0)
         out, track = room(2 * record.delivered * LANES), room(N * rows * LANES)
         p, state = _in_lanes(constants), _in_lanes(starts)
@@ -270,7 +280,7 @@ def side_by_side(actuator: Actuator, *, bent: bool = False) -> Follow:
             width,
             apart,
             0 if wandering else AXES,
-            ALL if smooth else AXES,
+            ALL if gusts else AXES,
             signatures.pointer(record.rows),
             signatures.pointer(full),
             *[signatures.pointer(v, LANE_VECTOR) for v in (a, table, p, state, out, track)],

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
 
@@ -24,8 +24,9 @@ from podusv_cli.identify.fit.beside import (
     DEVIATION,
     LASTING,
     PLAIN,
+    RATE,
     SIZE,
-    SMOOTH,
+    SWINGS,
     entry,
 )
 from podusv_cli.identify.fit.estimate import HullSearch
@@ -37,7 +38,9 @@ from podusv_cli.identify.fit.march import (
     DELAY,
     DELIVERED,
     EXPONENT,
+    GUSTS,
     NAMES,
+    SEA,
     SIGMAS,
     SQUARE,
     THRUST,
@@ -61,7 +64,7 @@ from podusv_cli.scenario.identify import COMPASS_OFF, THRUST_CURVE, WANDER, Iden
 from podusv_cli.scenario.model import Scenario
 
 Entry = TypeVar("Entry")
-CURRENTS = slice(NAMES.index(CURRENT[0]), NAMES.index(CURRENT[0]) + len(CURRENT))
+OWN = NAMES.index(SEA[0])  # where what a log alone has begins
 WALKS = ("q_u", "q_v", "q_r", "q_b", "q_b_psi")
 UNSURE = 1.5  # of the logarithm of a noise, before the logs are read
 LOUD = 2.0  # of these deviations, of accelerations and loads, where a second search begins
@@ -71,10 +74,14 @@ AT_START = (0.2, 0.1, 0.05)  # m/s, m/s, rad/s: the same of the velocities at th
 # What a log begins with: speed through the water, sway, loads. A filter that is unsure of them on
 # positions of 0.5 m begins with kicks of 1 m/s for a boat of 2 m, and what it makes of these
 # differs from one hull to the next, for all of the log; so they are looked for.
-FIRST = ("first u", "first v", "first load_x", "first load_y", "first load_psi")
+FIRST = ("first u", "first v")
+FIRST_LOADS = ("first load_x", "first load_y", "first load_psi")
+MEAN_LOADS = ("mean load_x", "mean load_y", "mean load_psi")  # in their place, of gusts
 TURNED = 0.05  # rad, of the heading at the start
 FORGETS = 1.0  # of the logarithm of the time in which a position's error forgets
-CHANGES = 1.0  # s, how long a smooth load of the model ship takes to change; of its logarithm, too
+# Of gusts, before the logs: w_b on the model ship [rad/s] and z_b, and the deviations of their
+# logarithms.
+SWINGING, DAMPED = (1.0, 1.0), (0.7, 0.7)
 FLOWING = 0.1  # of the speed at full thrust: a current that nothing is known of
 BLOCK = 30.0  # s of a log, whose innovations count together
 
@@ -89,7 +96,7 @@ class FitProblem:
     scenario: Scenario
     wanted: Identify
     logs: Sequence[FilterLog]
-    smooth: bool = False  # whether loads are
+    gusts: bool = False  # whether loads are those of gusts
 
     @cached_property
     def facts(self) -> Facts:
@@ -137,13 +144,12 @@ class FitProblem:
         return [*own, FreeNumber(LASTING, USUAL, FORGETS)]
 
     @cached_property
-    def _smoothness(self) -> list[FreeNumber]:
-        """T_b of loads that are smooth; one below a step of the filter could not be followed."""
-        if not self.smooth:
+    def _gusts(self) -> list[FreeNumber]:
+        """Numbers of gusts, where loads are those."""
+        if not self.gusts:
             return []
-        usual = CHANGES * math.sqrt(self.facts.lam)
-        shortest = math.log(self.wanted.step / usual) / CHANGES
-        return [FreeNumber(SMOOTH, usual, CHANGES, least=shortest)]
+        usual = SWINGING[0] / math.sqrt(self.facts.lam)
+        return [FreeNumber(RATE, usual, SWINGING[1]), FreeNumber(SWINGS, *DAMPED)]
 
     @cached_property
     def hull(self) -> list[FreeNumber]:
@@ -170,7 +176,7 @@ class FitProblem:
         guessed = [name for name in self._sensor_deviations if name not in self.wanted.noise]
         noises = [FreeNumber(n, getattr(self.filter, n), UNSURE, least=LEAST) for n in guessed]
         noises += [FreeNumber(n, getattr(self.filter, n), UNSURE) for n in WALKS]
-        noises += [*self._position, *self._smoothness]
+        noises += [*self._position, *self._gusts]
         own = {**dict.fromkeys(CURRENT if self.current else (), self.current), **self._first}
         each = [
             FreeNumber(f"{name}, {log.name}", 0.0, sd, ratio=False)
@@ -198,15 +204,20 @@ class FitProblem:
         """Standard deviations of what a log begins with, about what is guessed of it."""
         f, s = self.filter, self.facts.s
         sizes = (AT_START[0] * s, AT_START[1] * s, f.sigma_b, f.sigma_b, f.sigma_b_psi)
-        return dict(zip(FIRST, sizes, strict=True))
+        return dict(zip((*FIRST, *self._loads), sizes, strict=True))
+
+    @property
+    def _loads(self) -> tuple[str, ...]:
+        """Numbers of the load that a log begins with; of gusts, those of its mean."""
+        return MEAN_LOADS if self.gusts else FIRST_LOADS
 
     @cached_property
     def _fixed_constants(self) -> Vector:
         """The filter's constants before anything is looked for, in the order of `NAMES`."""
         still = {THRUST: 1.0, EXPONENT: SQUARE}
-        still |= dict.fromkeys((DEAD_BAND, DELAY, COMPASS, *CURRENT), 0.0)
-        still |= {DEVIATION: self.wander, LASTING: USUAL, SMOOTH: 1.0}
-        still |= dict(zip(ASKED, (float(self.wander > 0.0), float(self.smooth)), strict=True))
+        still |= dict.fromkeys((DEAD_BAND, DELAY, COMPASS, *SEA), 0.0)
+        still |= {DEVIATION: self.wander, LASTING: USUAL, RATE: 1.0, SWINGS: 1.0}
+        still |= dict(zip(ASKED, (float(self.wander > 0.0), float(self.gusts)), strict=True))
         known = self.scenario.vessel.constants() | self.filter.constants() | still
         return np.array([known[name] for name in NAMES])
 
@@ -235,22 +246,28 @@ class FitProblem:
         at, place = np.array(free, dtype=np.int64).T
         return at, place
 
-    def constants(self, values: Vector, current: Sequence[float]) -> Vector:
-        """The filter's constants, with `values` from `at`, in water that flows so fast [m/s]."""
+    def constants(self, values: Vector, sea: Sequence[float]) -> Vector:
+        """The filter's constants, with `values` from `at`, in a sea as of `SEA`, or part of it."""
         at, place = self._free_constants
         constants = self._fixed_constants.copy()
         constants[at] = values[place]
-        constants[CURRENTS] = current
+        constants[OWN : OWN + len(sea)] = sea
         return constants
 
-    def _currents(self, log: FilterLog, values: Vector) -> list[float]:
-        """The current of a log [m/s] with `values` from `at`, north and east."""
-        names = [f"{axis}, {log.name}" for axis in CURRENT]
+    def _sea(self, log: FilterLog, values: Vector) -> list[float]:
+        """The sea of a log with `values` from `at`: current [m/s], and mean load where it gusts."""
+        names = [f"{n}, {log.name}" for n in (*CURRENT, *(MEAN_LOADS if self.gusts else ()))]
         return [float(values[self._places[n]]) if n in self._places else 0.0 for n in names]
 
     def currents(self, log: FilterLog, y: Vector) -> list[float]:
         """The current of a log at a point [m/s], north and east."""
-        return self._currents(log, self.at(y))
+        return self._sea(log, self.at(y))[: len(CURRENT)]
+
+    @cached_property
+    def sea(self) -> Vector:
+        """Standard deviations of a log's sea before it is read: current, and mean load in gusts."""
+        loads = [self._first[name] for name in self._loads] if self.gusts else []
+        return np.array([self.current, self.current, *loads])
 
     def vessel(self, y: Vector) -> Vessel:
         """The hull at a point. Raises ValidationError where no hull can be like that."""
@@ -301,7 +318,7 @@ class FitProblem:
         return side_by_side(self.scenario.actuator, bent=self._seeks_thrust_curve)
 
     def start(
-        self, log: FilterLog, current: Sequence[float], values: Vector, *, first_known: bool = True
+        self, log: FilterLog, sea: Sequence[float], values: Vector, *, first_known: bool = True
     ) -> Vector:
         """The filter's state at the beginning of a log, in the water's frame.
 
@@ -310,39 +327,41 @@ class FitProblem:
         state = log.state.copy()
         state[2] -= values[self._places[COMPASS]] if COMPASS in self._places else 0.0
         c, s = math.cos(state[2]), math.sin(state[2])
-        state[3] -= c * current[0] + s * current[1]
-        state[4] -= c * current[1] - s * current[0]
+        state[3] -= c * sea[0] + s * sea[1]
+        state[4] -= c * sea[1] - s * sea[0]
         wander = values[self._places[DEVIATION]] if DEVIATION in self._places else self.wander
         pose = math.hypot(max(self.filter.sigma_p, 1e-9) * 3.0, wander)
         speeds = np.array(AT_START) * [self.facts.s, self.facts.s, self.facts.s / self.facts.lam]
-        loads, first = [*self._first.values()][2:], np.zeros(len(FIRST))
+        loads, first = [*self._first.values()][2:], np.zeros(len(self._first))
         if first_known:
-            first = values[[self._places[f"{name}, {log.name}"] for name in FIRST]]
+            first = values[[self._places[f"{name}, {log.name}"] for name in self._first]]
             speeds[:2], loads = 0.0, [0.0] * 3
         state[3:5] += first[:2]
-        unsure = np.diag(np.square([pose, pose, TURNED, *speeds, *loads]))
         beside = np.zeros(SIZE - N - PACKED)
         own = [PLAIN - N - PACKED + entry(a, a) for a in range(ALL)]
         beside[own[:AXES]] = wander * wander  # of the error, north and east
-        if self.smooth:
-            q, q_psi, T_b = (values[self._places[n]] for n in (*WALKS[3:], SMOOTH))
-            beside[own[AXES:]] = np.square([q, q, q_psi]) / (2.0 * T_b)
+        if self.gusts:
+            q, q_psi, w_b, z_b = (values[self._places[n]] for n in (*WALKS[3:], *GUSTS))
+            rates = np.array([q, q, q_psi]) * math.sqrt(w_b / (4.0 * z_b))
+            beside[own[AXES:]], loads, first[2:] = rates**2, rates / w_b, sea[len(CURRENT) :]
+        unsure = np.diag(np.square([pose, pose, TURNED, *speeds, *loads]))
         return np.concatenate([state, first[2:], unsure[np.triu_indices(N)], beside])
 
     def follow(
-        self, log: FilterLog, points: Sequence[Vector], currents: Sequence[Sequence[float]] = ()
+        self, log: FilterLog, points: Sequence[Vector], seas: Sequence[Sequence[float]] = ()
     ) -> Followed:
-        """The filter along a log, for every point, in the current of the point or another."""
+        """The filter along a log, for every point, in the sea of the point or another."""
         values = [self.at(y) for y in points]
-        flows = currents or [self._currents(log, each) for each in values]
+        around = seas or [self._sea(log, each) for each in values]
         starts = [
-            self.start(log, flow, each, first_known=not currents)
-            for flow, each in zip(flows, values, strict=True)
+            self.start(log, sea, each, first_known=not seas)
+            for sea, each in zip(around, values, strict=True)
         ]
-        runs = self._runs(log, [*map(self.constants, values, flows)], starts, tracked=True)
+        runs = self._runs(log, [*map(self.constants, values, around)], starts, tracked=True)
         whole = Followed(*(np.concatenate(arrays, axis=-1) for arrays in zip(*runs, strict=True)))
+        flows = np.array([sea[: len(CURRENT)] for sea in around])
         since = log.times - log.times[0]
-        whole.track[:, :2] += since[:, None, None] * np.array(flows).T
+        whole.track[:, :2] += since[:, None, None] * flows.T
         return whole
 
     def _runs(
@@ -369,9 +388,8 @@ class FitProblem:
 
         def fill(log: FilterLog, begin: int, end: int) -> None:
             """Write the rows of a log; runs that are alike along it are made once."""
-            flows = [self._currents(log, each) for each in values]
-            both = zip(values, flows, strict=True)
-            rows = [np.append(self.constants(v, f), self.start(log, f, v)) for v, f in both]
+            both = [(v, self._sea(log, v)) for v in values]
+            rows = [np.append(self.constants(v, sea), self.start(log, sea, v)) for v, sea in both]
             # What another log begins with changes nothing here.
             each, of = np.unique(rows, axis=0, return_inverse=True)
             constants, starts = list(each[:, : len(NAMES)]), list(each[:, len(NAMES) :])
@@ -393,11 +411,6 @@ class FitProblem:
         """
         loud = np.array([LOUD * (number.name in WALKS) for number in self.numbers])
         return HullSearch(self.innovations, len(loud), self.blocks, len(self.hull), second=loud)
-
-    def search_from(self, before: Mapping[str, float]) -> HullSearch:
-        """What is searched, the first time from numbers in units of their priors, by name."""
-        first = np.array([before.get(number.name, 0.0) for number in self.numbers])
-        return replace(self.search, first=first)
 
     @cached_property
     def blocks(self) -> Whole:
