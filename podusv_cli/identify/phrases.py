@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from podusv_cli.identify.answer import AXES, Identification, Parameter
-from podusv_cli.identify.fit.beside import DEVIATION, LASTING
+from podusv_cli.identify.fit.beside import DEVIATION, LASTING, RATE, SWINGS
 from podusv_cli.identify.fit.estimate import OPEN
 from podusv_cli.identify.fit.march import COMPASS
 from podusv_cli.identify.judge import SHOWN, WHO
@@ -47,7 +47,7 @@ def summary(answer: Identification) -> list[str]:
 
 
 def _sensors(answer: Identification) -> list[str]:
-    """Which lasting errors of sensors were looked for, and what came out."""
+    """Which lasting errors of sensors and which loads were looked for, and what came out."""
     found, problem = {p.name: p for p in answer.parameters}, answer.problem
     lines, compass = [], found.get(COMPASS)
     if LASTING in found:
@@ -65,12 +65,19 @@ def _sensors(answer: Identification) -> list[str]:
     if compass:
         degrees = _with_ends(compass, "deg", math.degrees(1.0))
         lines.append(f"The compass shows {degrees} more than the heading.")
+    if problem.gusts:
+        lines.append(
+            "Gusts explain the logs better than loads that wander: loads swing about a mean at "
+            f"{_with_ends(found[RATE], 'rad/s')}, with the damping ratio "
+            f"{_with_ends(found[SWINGS], '')}."
+        )
     return lines
 
 
 def _with_ends(p: Parameter, unit: str, factor: float = 1.0) -> str:
     """A number with its interval, times a factor that makes its unit this one."""
-    return f"{factor * p.value:.2g} {unit} ({factor * p.low:.2g} to {factor * p.high:.2g})"
+    value = f"{factor * p.value:.2g} {unit}".rstrip()
+    return f"{value} ({factor * p.low:.2g} to {factor * p.high:.2g})"
 
 
 def _judge_in_words(answer: Identification) -> list[str]:

@@ -140,15 +140,20 @@ class HullEstimate:
 
 
 def estimate_hull(
-    search: HullSearch, tell: Tell = lambda i, value: None, *, starts: int = STARTS
+    search: HullSearch,
+    tell: Tell = lambda i, value: None,
+    *,
+    starts: int = STARTS,
+    begun: HullEstimate | None = None,
 ) -> HullEstimate:
     """The best of several searches: from the prior's centre or `first`, `second`, then elsewhere.
 
-    The others begin near the better start. They end when two have come to the same value. An interrupt leaves the best so far. Raises
-    UsageError where the filter breaks down at the prior's centre.
+    The others begin near the better start. They end when two have come to the same value. `begun`
+    is the first search where that was made before. An interrupt leaves the best so far. Raises
+    UsageError where the filter breaks down at the first start.
     """
     starts_at = [np.zeros(search.size) if search.first is None else search.first]
-    found = [_search_from(search, starts_at[0], tell)]
+    found = [begun or _search_from(search, starts_at[0], tell)]
     if not math.isfinite(found[0].value):
         raise UsageError(f"with the vessel as it is given {BREAKS}")
     rng = np.random.Generator(np.random.PCG64(search.size))

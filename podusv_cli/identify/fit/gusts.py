@@ -19,35 +19,55 @@ BETTER = 10.0  # in -2 log of the posterior: what gusts, of two numbers more, ha
 def estimate_in_sea(problem: FitProblem, tell: Tell) -> tuple[FitProblem, HullEstimate]:
     """The best numbers, and in which sea: loads that wander, or gusts where these are likelier.
 
-    Gusts are tried with the hull of loads that wander: if their own numbers alone make the logs
-    likelier, all are looked for again. An interrupt leaves the best so far.
+    An interrupt leaves the best so far.
     """
-    found = estimate_hull(problem.search, tell)
-    if found.interrupted:
-        return problem, found
-    gusty = replace(problem, gusts=True)
+    first = estimate_hull(problem.search, tell, starts=1)
+    if first.interrupted:
+        return problem, first
     try:
-        start, value = fit_gusts(gusty, _named_alike(problem, gusty, found.y), tell)
-        if value > found.value - BETTER:
-            return problem, found
-        again = estimate_hull(replace(gusty.search, first=start), tell)
-    except KeyboardInterrupt:  # before its first round
-        return problem, replace(found, interrupted=True)
-    return (gusty, again) if again.value < found.value - BETTER else (problem, found)
+        gusty = _estimate_in_gusts(problem, first, tell)
+    except KeyboardInterrupt:
+        return problem, replace(first, interrupted=True)
+    return gusty or (problem, estimate_hull(problem.search, tell, begun=first))
 
 
-def _named_alike(problem: FitProblem, gusty: FitProblem, y: Vector) -> Vector:
-    """A point's numbers for gusts, whose mean load is the one that a log began with."""
+def _estimate_in_gusts(
+    problem: FitProblem, first: HullEstimate, tell: Tell
+) -> tuple[FitProblem, HullEstimate] | None:
+    """The best numbers in gusts; None where these are no likelier than loads that wander.
+
+    Gusts are tried with the hull of the first search. Where their own numbers alone make the logs
+    likelier, all are looked for; and as that search may have ended at a hull that is wrong, which
+    looks like gusts, loads that wander have to be less likely with the hull that comes out, too.
+    """
+    gusty = replace(problem, gusts=True)
+    start, value = fit_gusts(gusty, same_numbers(problem, gusty, first.y), tell)
+    if value > first.value - BETTER:
+        return None
+    found = estimate_hull(replace(gusty.search, first=start), tell)
+    if found.interrupted:
+        return gusty, found
+    calm = replace(problem.search, first=same_numbers(gusty, problem, found.y))
+    wanders = estimate_hull(calm, tell, starts=1)
+    if wanders.interrupted:
+        return gusty, replace(found, interrupted=True)
+    return (gusty, found) if found.value < wanders.value - BETTER else None
+
+
+def same_numbers(problem: FitProblem, other: FitProblem, y: Vector) -> Vector:
+    """A point in the numbers of another sea; what a log began with and its mean load are one."""
     known = dict(zip((number.name for number in problem.numbers), y.tolist(), strict=True))
-    for mean, first in zip(MEAN_LOADS, FIRST_LOADS, strict=True):
-        known |= {f"{mean}, {log.name}": known[f"{first}, {log.name}"] for log in problem.logs}
-    return np.array([known.get(number.name, 0.0) for number in gusty.numbers])
+    for log in problem.logs:
+        for pair in zip(FIRST_LOADS, MEAN_LOADS, strict=True):
+            names = [f"{name}, {log.name}" for name in pair]
+            known |= dict.fromkeys(names, next(known[n] for n in names if n in known))
+    return np.array([known.get(number.name, 0.0) for number in other.numbers])
 
 
 def fit_gusts(gusty: FitProblem, y: Vector, tell: Tell) -> tuple[Vector, float]:
     """A point with the likeliest gusts beside its other numbers, and -2 log of the posterior there.
 
-    That is infinite where the filter breaks down.
+    That is infinite where the filter breaks down. An interrupt ends it.
     """
     own = (*WALKS[3:], *GUSTS)
     free = np.array([i for i, number in enumerate(gusty.numbers) if number.name in own])
@@ -66,4 +86,6 @@ def fit_gusts(gusty: FitProblem, y: Vector, tell: Tell) -> tuple[Vector, float]:
     if not math.isfinite(search.values([y[free]])[0]):
         return y, math.inf
     found = estimate_hull(search, tell, starts=1)
+    if found.interrupted:
+        raise KeyboardInterrupt
     return point(found.y), float(found.value + held @ held)

@@ -1,0 +1,150 @@
+"""Loads of gusts: their process against algebra, when they are taken, and what that is good for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from identify_samples import commands_of, motion, problem, table_of
+from scipy.linalg import solve_continuous_lyapunov
+
+from benchmarks import coverage
+from podusv_cli.components.actuators.ideal import Ideal
+from podusv_cli.components.estimators.ekf import MOVING, N
+from podusv_cli.core.kernel import bundle
+from podusv_cli.identify.fit import gusts
+from podusv_cli.identify.fit.beside import AXES, CROSS, PLAIN, SIZE, entry, follow
+from podusv_cli.identify.fit.estimate import HullEstimate, estimate_hull
+from podusv_cli.identify.fit.gusts import estimate_in_sea, same_numbers
+from podusv_cli.identify.fit.march import GUSTS, NAMES
+from podusv_cli.identify.fit.problem import FIRST_LOADS, MEAN_LOADS
+from podusv_cli.identify.fit.records import log_of
+from podusv_cli.identify.intake import logs_of
+from podusv_cli.identify.phrases import summary
+from podusv_cli.scenario.identify import LogFile
+from podusv_cli.workflows.identify import answer_logs
+
+MEANS = dict(zip(MEAN_LOADS, (0.7, -1.1, 0.4), strict=True))
+
+
+@pytest.fixture(scope="module")
+def log():
+    """A minute of the model ship, 5 times a second."""
+    times = np.arange(0.0, 60.0, 0.2)
+    commands = commands_of(times)
+    states = motion(commands, times, np.array([0.0, 0.0, 0.3, 0.4, 0.0, 0.0]))
+    return log_of(table_of(times, states, commands), Ideal(), 0.1)
+
+
+def point_of(given, log, **numbers):
+    """A point of these numbers, from numbers in their own units."""
+    y = np.zeros(len(given.numbers))
+    for i, number in enumerate(given.numbers):
+        value = numbers.get(number.name.removesuffix(f", {log.name}"), number.prior)
+        ratio = math.log(value / number.prior) if number.ratio else value - number.prior
+        y[i] = ratio / number.sd
+    return y
+
+
+def test_a_log_begins_with_the_gusts_that_go_on(log):
+    """Variances of Lyapunov's equation, of which the filter has no rate while nothing is measured."""
+    given = replace(problem([log]), gusts=True)
+    own = {"q_b": 0.3, "q_b_psi": 0.2, "w_b": 1.7, "z_b": 0.35}
+    values = given.at(point_of(given, log, **own, **MEANS))
+    sea = given._sea(log, values)
+    assert sea == pytest.approx([0.0, 0.0, *MEANS.values()])
+    state = given.start(log, sea, values)
+    assert state[MOVING:N] == pytest.approx([*MEANS.values()])
+    A = np.array([[0.0, 1.0], [-(1.7**2), -2.0 * 0.35 * 1.7]])
+    for axis, q in enumerate((0.3, 0.3, 0.2)):
+        P = solve_continuous_lyapunov(A, -np.diag([0.0, (q * 1.7) ** 2]))
+        load = N - 3 + axis
+        row = N + load * N - load * (load - 1) // 2  # of the packed triangle, its diagonal
+        assert state[row] == pytest.approx(P[0, 0])
+        assert state[PLAIN + entry(AXES + axis, AXES + axis)] == pytest.approx(P[1, 1])
+    rate = np.zeros(SIZE)
+    k = bundle(dict(zip(NAMES, given.constants(values, sea), strict=True)))
+    follow(np.zeros(3), state, k, rate)
+    assert rate[MOVING:N] == pytest.approx(0.0, abs=1e-12)
+    for a in range(AXES, AXES + 3):
+        assert rate[PLAIN + a] == pytest.approx(0.0, abs=1e-12)
+        load = MOVING + a - AXES
+        row = N + load * N - load * (load - 1) // 2
+        assert rate[row] == pytest.approx(0.0, abs=1e-12)
+        assert rate[PLAIN + CROSS + 5 * load + a] == pytest.approx(0.0, abs=1e-12)
+        assert rate[PLAIN + entry(a, a)] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_which_sea_is_kept(log, monkeypatch):
+    """Gusts alone that gain enough, at first and beside loads that wander with their own hull."""
+    given = problem([log], free=("m33",))
+    size = len(given.numbers)
+    made: dict[bool, list[float]] = {}
+
+    def estimate(search, tell, *, starts=5, begun=None):
+        """The next value of this sea's."""
+        value = made[search.size > size].pop(0)
+        return begun or HullEstimate(np.zeros(search.size), value, np.eye(2), 3, True)
+
+    monkeypatch.setattr(gusts, "estimate_hull", estimate)
+
+    def kept(first, trial, *others, **values):
+        made[False], made[True] = [first, *others], [*values.get("gusty", ())]
+        monkeypatch.setattr(gusts, "fit_gusts", lambda gusty, *_: (np.zeros(size + 2), trial))
+        sought, found = estimate_in_sea(given, lambda *_: None)
+        assert not made[False]
+        assert not made[True]  # as many searches as are meant
+        return sought.gusts, found.value
+
+    for trial in (100.0, 90.5, math.inf):
+        assert kept(100.0, trial, 100.0) == (False, 100.0)
+    assert kept(100.0, 89.0, 70.0, gusty=[50.0]) == (True, 50.0)
+    assert kept(100.0, 89.0, 59.0, 100.0, gusty=[50.0]) == (False, 100.0)
+
+
+def test_an_interrupt_while_gusts_are_tried_leaves_the_hull_before(log, monkeypatch):
+    given = problem([log], free=("m33",))
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(gusts, "fit_gusts", interrupted)
+    sought, found = estimate_in_sea(given, lambda *_: None)
+    alone = estimate_hull(given.search, starts=1)
+    assert (sought.gusts, found.interrupted) == (False, True)
+    assert found.y == pytest.approx(alone.y, abs=0.0)
+
+
+def test_gusts_begin_with_the_numbers_of_loads_that_wander(log):
+    """A mean load with the one that the log began with; what is new at its prior; and back."""
+    given = problem([log], free=("m33",))
+    gusty = replace(given, gusts=True)
+    y = np.arange(1.0, 1.0 + len(given.numbers))
+    there = same_numbers(given, gusty, y)
+    start = dict(zip((n.name for n in gusty.numbers), there.tolist(), strict=True))
+    known = dict(zip((n.name for n in given.numbers), y.tolist(), strict=True))
+    for mean, first in zip(MEAN_LOADS, FIRST_LOADS, strict=True):
+        assert start.pop(f"{mean}, a.csv") == known.pop(f"{first}, a.csv")
+    assert [start.pop(name) for name in GUSTS] == [0.0, 0.0]
+    assert start == known
+    assert same_numbers(gusty, given, there) == pytest.approx(y, abs=0.0)
+
+
+@pytest.mark.slow
+def test_in_gusts_the_hull_comes_out_as_loads_that_wander_do_not_give_it(tmp_path):
+    """By another program: errors in standard deviations, and the sentence that says so."""
+    cell = coverage.CoverageSet(5001, 10, "shaft speeds", 0.02, "gusts", "cybership2")
+    before = coverage.known_before(cell)
+    boat = coverage.true_boat(before, cell, np.random.default_rng([cell.number, 99]))
+    given = [
+        (log, "fit")
+        for path in coverage.write_logs(tmp_path, boat, cell, before)
+        for log in logs_of(path, LogFile(file=path.name, delay=0.0), before)
+    ]
+    answer = answer_logs(before, coverage.WANTED, given, None)
+    assert answer.problem.gusts
+    off = {line["name"]: line["off"] for line in coverage.numbers_beside_truth(answer, boat)}
+    assert max(abs(off[name]) for name in ("m11", "m22", "m33")) < 3.0
+    assert any("Gusts explain the logs better" in line for line in summary(answer))
