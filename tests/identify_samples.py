@@ -53,9 +53,9 @@ def slope(k, tau, current=(0.0, 0.0)):
     return rate
 
 
-def motion(commands, times, start, hull=HULL, current=(0.0, 0.0)):
+def motion(commands, times, start, hull=HULL, current=(0.0, 0.0), load=(0.0, 0.0, 0.0)):
     """States at times, with commands held from each to the next, by another integrator."""
-    k, states = bundle(hull.constants()), [np.concatenate([start, np.zeros(3)])]
+    k, states = bundle(hull.constants()), [np.concatenate([start, load])]
     for i in range(len(times) - 1):
         span = times[i], times[i + 1]
         ended = solve_ivp(slope(k, commands[i], current), span, states[-1], rtol=1e-9, atol=1e-11)

@@ -14,6 +14,7 @@ from benchmarks import coverage
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.components.estimators.ekf import MOVING, N
 from podusv_cli.core.kernel import bundle
+from podusv_cli.identify import judge
 from podusv_cli.identify.fit import gusts
 from podusv_cli.identify.fit.beside import AXES, CROSS, PLAIN, SIZE, entry, follow
 from podusv_cli.identify.fit.estimate import HullEstimate, estimate_hull
@@ -130,6 +131,22 @@ def test_gusts_begin_with_the_numbers_of_loads_that_wander(log):
     assert [start.pop(name) for name in GUSTS] == [0.0, 0.0]
     assert start == known
     assert same_numbers(gusty, given, there) == pytest.approx(y, abs=0.0)
+
+
+def test_a_judged_log_s_own_mean_load_goes_on_in_its_free_runs():
+    """In gusts the current and the mean load are those of the log, which was not fitted."""
+    times, load = np.arange(0.0, 90.0, 0.2), (0.6, -0.9, 0.05)
+    commands, start = commands_of(times), np.array([0.0, 0.0, 0.3, 0.4, 0.0, 0.0])
+    states = motion(commands, times, start, current=(0.02, 0.01), load=load)
+    log = log_of(table_of(times, states, commands), Ideal(), 0.1)
+    given = replace(problem([log]), gusts=True)
+    y = point_of(given, log, q_b=0.05, q_b_psi=0.01)
+    sea = judge._sea(given, log, y)
+    assert sea == pytest.approx([0.02, 0.01, *load], abs=0.1)
+    first = np.searchsorted(log.times, 50.0)
+    (own, _), _, (still, _) = judge._free_run(given, log, y, int(first)).errors(30.0)
+    assert own < 0.5
+    assert still > 3.0
 
 
 @pytest.mark.slow
