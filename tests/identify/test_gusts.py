@@ -50,7 +50,7 @@ def point_of(given, log, **numbers):
 
 
 def test_a_log_begins_with_the_gusts_that_go_on(log):
-    """Variances of Lyapunov's equation, of which the filter has no rate while nothing is measured."""
+    """Variances of Lyapunov's equation; the filter has no rate of them."""
     given = replace(problem([log]), gusts=True)
     own = {"q_b": 0.3, "q_b_psi": 0.2, "w_b": 1.7, "z_b": 0.35}
     values = given.at(point_of(given, log, **own, **MEANS))
