@@ -93,7 +93,8 @@ def test_which_sea_is_kept(log, monkeypatch):
 
     def kept(first, trial, *others, **values):
         made[False], made[True] = [first, *others], [*values.get("gusty", ())]
-        monkeypatch.setattr(gusts, "fit_gusts", lambda gusty, *_: (np.zeros(size + 2), trial))
+        tried = HullEstimate(np.zeros(size + 2), trial, np.eye(2), 3)
+        monkeypatch.setattr(gusts, "fit_gusts", lambda *_: tried)
         sought, found = estimate_in_sea(given, lambda *_: None)
         assert not made[False]
         assert not made[True]  # as many searches as are meant
@@ -103,6 +104,16 @@ def test_which_sea_is_kept(log, monkeypatch):
         assert kept(100.0, trial, 100.0) == (False, 100.0)
     assert kept(100.0, 89.0, 70.0, gusty=[50.0]) == (True, 50.0)
     assert kept(100.0, 89.0, 59.0, 100.0, gusty=[50.0]) == (False, 100.0)
+
+
+def test_the_prior_of_loads_says_for_no_sea(log):
+    """Only what loads do to the logs and to all other numbers counts."""
+    given = problem([log], free=("m33",))
+    gusty = replace(given, gusts=True)
+    y, z = np.full(len(given.numbers), 2.0), np.full(len(gusty.numbers), 1.0)
+    wanders, swings = (HullEstimate(e, float(e @ e), np.eye(2), 3) for e in (y, z))
+    # q_b and q_b_psi beside 4 x (n - 2) of all others; with w_b and z_b beside (n - 2) of them.
+    assert gusts.gain(gusty, swings, given, wanders) == pytest.approx(3.0 * (len(y) - 2))
 
 
 def test_an_interrupt_while_gusts_are_tried_leaves_the_hull_before(log, monkeypatch):

@@ -268,10 +268,8 @@ def test_on_a_straight_track_a_current_along_it_is_left_to_the_load(boat):
     states = motion(commands, times, np.array([0.0, 0.0, 0.0, 0.5, 0.0, 0.0]), current=(0.1, 0.0))
     log = log_of(table_of(times, states, commands), Ideal(), 0.1)
     given = problem([log])
-    assert judge._current(given, log, np.zeros(len(given.numbers)))[0] == pytest.approx(
-        0.0, abs=1e-9
-    )
-    turning = judge._current(problem(boat[:1]), boat[0], np.zeros(len(given.numbers)))
+    assert judge._sea(given, log, np.zeros(len(given.numbers)))[0] == pytest.approx(0.0, abs=1e-9)
+    turning = judge._sea(problem(boat[:1]), boat[0], np.zeros(len(given.numbers)))
     assert turning == pytest.approx([0.05, -0.03], abs=0.02)
 
 

@@ -14,6 +14,9 @@ from podusv_cli.identify.fit.march import GUSTS
 from podusv_cli.identify.fit.problem import FIRST_LOADS, MEAN_LOADS, WALKS, FitProblem
 
 BETTER = 10.0  # in -2 log of the posterior: what gusts, of two numbers more, have to gain
+# What makes the loads of a sea. Their prior counts neither for one sea nor for the other: on calm
+# water it says that loads are small, and less so of gusts, which would win by that.
+LOADS = (*WALKS[3:], *GUSTS)
 
 
 def estimate_in_sea(problem: FitProblem, tell: Tell) -> tuple[FitProblem, HullEstimate]:
@@ -41,17 +44,27 @@ def _estimate_in_gusts(
     looks like gusts, loads that wander have to be less likely with the hull that comes out, too.
     """
     gusty = replace(problem, gusts=True)
-    start, value = fit_gusts(gusty, same_numbers(problem, gusty, first.y), tell)
-    if value > first.value - BETTER:
+    trial = fit_gusts(gusty, same_numbers(problem, gusty, first.y), tell)
+    if gain(gusty, trial, problem, first) < BETTER:
         return None
-    found = estimate_hull(replace(gusty.search, first=start), tell)
+    found = estimate_hull(replace(gusty.search, first=trial.y), tell)
     if found.interrupted:
         return gusty, found
     calm = replace(problem.search, first=same_numbers(gusty, problem, found.y))
     wanders = estimate_hull(calm, tell, starts=1)
     if wanders.interrupted:
         return gusty, replace(found, interrupted=True)
-    return (gusty, found) if found.value < wanders.value - BETTER else None
+    return (gusty, found) if gain(gusty, found, problem, wanders) >= BETTER else None
+
+
+def gain(gusty: FitProblem, found: HullEstimate, problem: FitProblem, other: HullEstimate) -> float:
+    """In -2 log of the posterior, but for the prior of the loads: of gusts over another sea."""
+    values = [
+        estimate.value
+        - sum(e * e for e, n in zip(estimate.y, sea.numbers, strict=True) if n.name in LOADS)
+        for sea, estimate in ((gusty, found), (problem, other))
+    ]
+    return float(values[1] - values[0])
 
 
 def same_numbers(problem: FitProblem, other: FitProblem, y: Vector) -> Vector:
@@ -64,13 +77,12 @@ def same_numbers(problem: FitProblem, other: FitProblem, y: Vector) -> Vector:
     return np.array([known.get(number.name, 0.0) for number in other.numbers])
 
 
-def fit_gusts(gusty: FitProblem, y: Vector, tell: Tell) -> tuple[Vector, float]:
-    """A point with the likeliest gusts beside its other numbers, and -2 log of the posterior there.
+def fit_gusts(gusty: FitProblem, y: Vector, tell: Tell) -> HullEstimate:
+    """The likeliest gusts beside the other numbers of a point.
 
-    That is infinite where the filter breaks down. An interrupt ends it.
+    Its value is infinite where the filter breaks down at the point. An interrupt ends it.
     """
-    own = (*WALKS[3:], *GUSTS)
-    free = np.array([i for i, number in enumerate(gusty.numbers) if number.name in own])
+    free = np.array([i for i, number in enumerate(gusty.numbers) if number.name in LOADS])
     held = y.copy()
     held[free] = 0.0
 
@@ -84,8 +96,8 @@ def fit_gusts(gusty: FitProblem, y: Vector, tell: Tell) -> tuple[Vector, float]:
 
     search = HullSearch(innovations, len(free), gusty.blocks, first=y[free])
     if not math.isfinite(search.values([y[free]])[0]):
-        return y, math.inf
+        return HullEstimate(y, math.inf, np.eye(len(y)), 0)
     found = estimate_hull(search, tell, starts=1)
     if found.interrupted:
         raise KeyboardInterrupt
-    return point(found.y), float(found.value + held @ held)
+    return replace(found, y=point(found.y), value=float(found.value + held @ held))
