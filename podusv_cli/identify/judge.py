@@ -102,7 +102,7 @@ def _free_run(problem: FitProblem, log: FilterLog, y: Vector, first: int) -> Fre
     rows[first:, DELIVERED : DELIVERED + MOVING] = 0.0
     cut = log.of(rows)
     points = [y, problem.before(y)]
-    seas = [_sea(problem, cut.until(first), point) for point in points]
+    seas = [_estimate_sea(problem, cut.until(first), point) for point in points]
     track = problem.follow(cut, points, seas).track[first:]
     measured = np.where(
         log.record.rows[first:, DELIVERED : DELIVERED + 3] != 0.0,
@@ -115,13 +115,13 @@ def _free_run(problem: FitProblem, log: FilterLog, y: Vector, first: int) -> Fre
     return FreeRun(times, measured, (track[:, :3, 0], track[:, :3, 1], still))
 
 
-def _sea(problem: FitProblem, log: FilterLog, y: Vector) -> list[float]:
-    """The sea that a hull meets along a log, as `FitProblem.sea`, as far as the log determines it.
+def _estimate_sea(problem: FitProblem, log: FilterLog, y: Vector) -> list[float]:
+    """The sea that a hull meets along a log, as far as the log determines it.
 
     On a straight track a current along it is the same as a load, and is left to that. An
     interrupt ends it.
     """
-    sizes = problem.sea
+    sizes = problem.sea_sd
     if not sizes.any():
         return [0.0] * len(sizes)
 

@@ -54,7 +54,7 @@ def test_a_log_begins_with_the_gusts_that_go_on(log):
     given = replace(problem([log]), gusts=True)
     own = {"q_b": 0.3, "q_b_psi": 0.2, "w_b": 1.7, "z_b": 0.35}
     values = given.at(point_of(given, log, **own, **MEANS))
-    sea = given._sea(log, values)
+    sea = given.sea_at(log, values)
     assert sea == pytest.approx([0.0, 0.0, *MEANS.values()])
     state = given.start(log, sea, values)
     assert state[MOVING:N] == pytest.approx([*MEANS.values()])
@@ -152,7 +152,7 @@ def test_a_judged_log_s_own_mean_load_goes_on_in_its_free_runs():
     log = log_of(table_of(times, states, commands), Ideal(), 0.1)
     given = replace(problem([log]), gusts=True)
     y = point_of(given, log, q_b=0.05, q_b_psi=0.01)
-    sea = judge._sea(given, log, y)
+    sea = judge._estimate_sea(given, log, y)
     assert sea == pytest.approx([0.02, 0.01, *load], abs=0.1)
     first = np.searchsorted(log.times, 50.0)
     (own, _), _, (still, _) = judge._free_run(given, log, y, int(first)).errors(30.0)

@@ -171,8 +171,8 @@ def test_a_few_numbers_come_out_of_two_logs(boat):
         width = number.sd * sd[i]
         assert width < 0.05
         assert abs(math.log(values[number.name] / truth[number.name])) < 3.5 * width
-    assert given.currents(boat[0], found.y) == pytest.approx([0.05, -0.03], abs=0.01)
-    assert given.currents(boat[1], found.y) == pytest.approx([0.0, 0.04], abs=0.01)
+    assert given.sea_at(boat[0], given.at(found.y)) == pytest.approx([0.05, -0.03], abs=0.01)
+    assert given.sea_at(boat[1], given.at(found.y)) == pytest.approx([0.0, 0.04], abs=0.01)
     assert values["delay"] == pytest.approx(0.0, abs=0.03)
     assert values["sigma_p"] == pytest.approx(0.01, rel=0.1)
 
@@ -268,8 +268,9 @@ def test_on_a_straight_track_a_current_along_it_is_left_to_the_load(boat):
     states = motion(commands, times, np.array([0.0, 0.0, 0.0, 0.5, 0.0, 0.0]), current=(0.1, 0.0))
     log = log_of(table_of(times, states, commands), Ideal(), 0.1)
     given = problem([log])
-    assert judge._sea(given, log, np.zeros(len(given.numbers)))[0] == pytest.approx(0.0, abs=1e-9)
-    turning = judge._sea(problem(boat[:1]), boat[0], np.zeros(len(given.numbers)))
+    ahead, _ = judge._estimate_sea(given, log, np.zeros(len(given.numbers)))
+    assert ahead == pytest.approx(0.0, abs=1e-9)
+    turning = judge._estimate_sea(problem(boat[:1]), boat[0], np.zeros(len(given.numbers)))
     assert turning == pytest.approx([0.05, -0.03], abs=0.02)
 
 

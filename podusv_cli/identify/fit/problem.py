@@ -254,17 +254,13 @@ class FitProblem:
         constants[OWN : OWN + len(sea)] = sea
         return constants
 
-    def _sea(self, log: FilterLog, values: Vector) -> list[float]:
+    def sea_at(self, log: FilterLog, values: Vector) -> list[float]:
         """The sea of a log with `values` from `at`: current [m/s], and mean load where it gusts."""
         names = [f"{n}, {log.name}" for n in (*CURRENT, *(MEAN_LOADS if self.gusts else ()))]
         return [float(values[self._places[n]]) if n in self._places else 0.0 for n in names]
 
-    def currents(self, log: FilterLog, y: Vector) -> list[float]:
-        """The current of a log at a point [m/s], north and east."""
-        return self._sea(log, self.at(y))[: len(CURRENT)]
-
     @cached_property
-    def sea(self) -> Vector:
+    def sea_sd(self) -> Vector:
         """Standard deviations of a log's sea before it is read: current, and mean load in gusts."""
         loads = [self._first[name] for name in self._loads] if self.gusts else []
         return np.array([self.current, self.current, *loads])
@@ -352,7 +348,7 @@ class FitProblem:
     ) -> Followed:
         """The filter along a log, for every point, in the sea of the point or another."""
         values = [self.at(y) for y in points]
-        around = seas or [self._sea(log, each) for each in values]
+        around = seas or [self.sea_at(log, each) for each in values]
         starts = [
             self.start(log, sea, each, first_known=not seas)
             for sea, each in zip(around, values, strict=True)
@@ -388,7 +384,7 @@ class FitProblem:
 
         def fill(log: FilterLog, begin: int, end: int) -> None:
             """Write the rows of a log; runs that are alike along it are made once."""
-            both = [(v, self._sea(log, v)) for v in values]
+            both = [(v, self.sea_at(log, v)) for v in values]
             rows = [np.append(self.constants(v, sea), self.start(log, sea, v)) for v, sea in both]
             # What another log begins with changes nothing here.
             each, of = np.unique(rows, axis=0, return_inverse=True)
