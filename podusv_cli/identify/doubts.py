@@ -115,7 +115,7 @@ def thrust_words(answer: Identification) -> list[str]:
     if not said:
         return []
     use = (
-        "beside it take actuator.yaml, which has that thrust"
+        "beside it take the actuator that is written with it, which has that thrust"
         if answer.actuator
         else "the actuator's kind has no place for it, so its loads have to be changed likewise"
     )

@@ -144,7 +144,7 @@ def test_a_log_determines_the_curve(otter):
         f"dead band of the thrust, a part of full n, is {ends['dead_band'][1]:.4g} ("
     )
     assert "exponent of the thrust over n, 2 being that of the actuator's numbers, is 1." in line
-    assert "beside it take actuator.yaml" in line
+    assert "beside it take the actuator that is written with it" in line
     full = scenario.actuator.pods[0].most_n[0]
     for n in (0.3 * full, 0.8 * full):
         exact = TWO[0].thrust(n)
