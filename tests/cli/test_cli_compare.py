@@ -254,7 +254,7 @@ def on_a_terminal(monkeypatch, width=80):
         )
 
 
-@pytest.mark.parametrize("laws", [1, 4, 14])
+@pytest.mark.parametrize("laws", [1, pytest.param(4, marks=pytest.mark.long), 14])
 def test_a_terminal_shows_the_headlines_of_all_laws_beside_each_other(podusv, monkeypatch, laws):
     labels = [f"a_long_name_{i}" if i % 3 == 0 else f"law_{i}" for i in range(laws)]
     several = ", ".join(f"{label}: {{K_Pu: {i + 1.0}}}" for i, label in enumerate(labels))

@@ -181,11 +181,16 @@ def cell(tmp_path, monkeypatch, capsys) -> Command:
 
 
 def cells() -> list[Any]:
-    """Every kind with every command."""
+    """Every kind with every command; one cell in three is not long, in every row and column."""
     return [
-        pytest.param(kind, command, marks=[pytest.mark.slow] * ((kind, command) in SLOW))
-        for kind in KINDS
-        for command in COMMANDS
+        pytest.param(
+            kind,
+            command,
+            marks=[pytest.mark.slow] * ((kind, command) in SLOW)
+            + [pytest.mark.long] * ((row + column) % 3 != 0),
+        )
+        for row, kind in enumerate(KINDS)
+        for column, command in enumerate(COMMANDS)
     ]
 
 

@@ -29,7 +29,7 @@ def _in_a_folder(tmp_path, monkeypatch):
 
 def test_a_track_beside_a_run_is_as_far_away_as_it_was_put():
     alone = {"controllers": None, "controller": {"kind": "momentum_vector"}}
-    run = p.run("task.yaml", alone, out="run")
+    run = p.run("task.yaml", alone, out="run", figures=False)
     t, x, y, psi = (run[name][3:61:4] for name in ("time", "x", "y", "psi"))
     aside = np.where(np.arange(len(t)) == 5, 1.7, 0.5)
     turned = np.degrees(psi + 0.31 + 2.0 * np.pi) % 360.0
@@ -100,6 +100,7 @@ def test_python_has_the_same():
     assert made["LOG"]["x"].tolist() == [row[1] for row in ROWS]
 
 
+@pytest.mark.long
 def test_a_path_that_is_followed_has_no_target_to_be_off(podusv: Command):
     alone = "controllers: null\ncontroller: {kind: alos}\n"
     write("legs.yaml", f"extends: task.yaml\n{LEGS}\n{alone}")
@@ -288,6 +289,7 @@ def test_with_an_origin_a_log_on_earth_lies_where_it_was(sailed_on_earth):
         "placed.yaml",
         {"controllers": None, "controller": {"kind": "momentum_vector"}},
         out="placed",
+        figures=False,
     )
     done = compared("placed", "LOG.csv")
     assert warnings_of(done) == []
@@ -311,7 +313,9 @@ def test_a_log_on_earth_is_moved_to_the_run_when_asked(podusv: Command, sailed_o
     assert numbers(done, "run")[1] < 1e-4
     measured = done.result.runs[-1].recording
     assert measured["x"][0] == pytest.approx(sailed_on_earth["x"][8], abs=1e-12)
-    podusv("compare", "run", "LOG.csv", "--align", "place", "--out", "both", "--force")
+    podusv(
+        "compare", "run", "LOG.csv", "--align", "place", "--out", "both", "--force", "--no-figures"
+    )
     with Path("both/comparison.csv").open() as file:
         rows = {row["metric"]: row for row in csv.DictReader(file)}
     assert float(rows["log_distance_max"]["run"]) < 1e-4

@@ -79,6 +79,7 @@ def test_a_vessel_is_written_with_a_task(podusv):
     assert "is a vessel of podusv" in podusv("new", "vessel", "otter").err
 
 
+@pytest.mark.long
 def test_a_paper_is_written_as_a_folder_that_compares_and_draws(podusv):
     said = podusv("new", "paper", "our_own")
     assert "next: podusv compare our_own/task.yaml" in said.out
@@ -268,6 +269,7 @@ def test_a_bug_in_a_package_s_command_is_one_of_the_package(place):
     assert "This is a bug in my-lab. Please report it" in said
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "thing", "says"),
     [

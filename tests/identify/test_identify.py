@@ -219,7 +219,9 @@ PUSHED = np.repeat([10.0, 30.0, 50.0, 20.0], 100)  # N
     ("push", "noise", "determined"),
     [
         pytest.param(PUSHED, (0.1, 0.02, 0.01), {"m11", "X_u"}, marks=pytest.mark.slow),
-        (PUSHED, (0.0, 0.0, 0.0), {"m11", "X_u"}),  # as only simulators make it
+        pytest.param(  # as only simulators make it
+            PUSHED, (0.0, 0.0, 0.0), {"m11", "X_u"}, marks=pytest.mark.long
+        ),
         (STILL, (0.01, 0.005, 0.002), set()),  # moored
     ],
 )

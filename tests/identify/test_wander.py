@@ -257,6 +257,7 @@ def boat_log(noise, *, compass=0.0, wander=0.0, seed=3):
     return log_of(table_of(times, states, commands, noise=noise, seed=seed), Ideal(), 0.1)
 
 
+@pytest.mark.long
 def test_which_numbers_are_looked_for():
     """By the logs, unless the deviation is given; 0 looks for none."""
     calm, wandering = boat_log((0.01, 0.005, 0.002)), boat_log((0.01, 0.005, 0.002), wander=1.0)

@@ -64,6 +64,7 @@ def test_a_study_is_opened_and_continued_from_its_folder() -> None:
         podusv.sweep(SHORT, out="t")
 
 
+@pytest.mark.long
 def test_a_search_gives_gains_by_law_and_ranks() -> None:
     pytest.importorskip("optuna")
     search = {

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import REQUIRED, kinds
+from rotation import one_in
 from scenario_samples import loaded
 from storage_samples import ENVIRONMENT, PYTHON, TEXTS, files, log, recording
 
@@ -187,7 +188,7 @@ FULL = {
 }
 
 
-@pytest.mark.parametrize("case", FULL)
+@pytest.mark.parametrize("case", one_in(3, [*FULL]))
 def test_what_cannot_be_written_is_an_error_in_one_line(tmp_path, case):
     limit, held, says = FULL[case]
     text = scenario(actuator="{kind: ideal}", law="pid", period=0)

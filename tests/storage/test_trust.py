@@ -15,6 +15,7 @@ from zipfile import ZipFile
 import pytest
 from command_samples import ROOT, one_line
 from installed_sample import install
+from rotation import one_in
 
 import podusv as python
 from podusv_cli.core.errors import ScenarioError
@@ -322,8 +323,15 @@ def begun(*words, cwd, python=sys.executable, path=ROOT):
     )
 
 
-@pytest.mark.parametrize("module", ["podusv_cli", "podusv"])
-@pytest.mark.parametrize("command", ["validate scenario.yaml", "list laws"])
+@pytest.mark.parametrize(
+    ("module", "command"),
+    [
+        ("podusv_cli", "validate scenario.yaml"),
+        ("podusv", "list laws"),
+        pytest.param("podusv_cli", "list laws", marks=pytest.mark.long),
+        pytest.param("podusv", "validate scenario.yaml", marks=pytest.mark.long),
+    ],
+)
 def test_no_module_of_somebody_s_folder_runs_where_podusv_begins_in_it(module, command):
     as_if_installed()
     said = begun("-m", module, *command.split(), cwd="gift")
@@ -336,7 +344,7 @@ def test_no_module_of_somebody_s_folder_runs_where_podusv_begins_in_it(module, c
         assert "evil" in one_line(said.stderr)
 
 
-@pytest.mark.parametrize("place", ["gift", "gift/evil-1.0.dist-info"])
+@pytest.mark.parametrize("place", one_in(2, ["gift", "gift/evil-1.0.dist-info"]))
 def test_a_notebook_in_somebody_s_folder_takes_nothing_there_for_installed(place):
     as_if_installed()
     for name in ("yaml.py", "signal.py"):  # which Python itself would take

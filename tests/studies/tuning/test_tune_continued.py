@@ -83,6 +83,7 @@ def test_a_folder_without_its_scenario_says_how_to_go_on(tmp_path, monkeypatch):
         place.check(tmp_path / "out")
 
 
+@pytest.mark.long
 def test_force_begins_a_search_anew_and_spares_what_is_no_search(tmp_path, optuna):
     def run(train, *, force):
         changes = ("tune.budget=8", "tune.batch=2", "tune.repeats=1", f"tune.train={train}")
