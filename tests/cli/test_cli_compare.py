@@ -362,6 +362,7 @@ def test_after_finished_runs_the_last_line_names_the_first_that_is_not_verified(
     assert "may not have converged" not in podusv("x", "--out", "y", "--force").err
 
 
+@pytest.mark.long
 def test_numbers_that_verify_has_found_converged_are_not_doubted_again(podusv, monkeypatch, capsys):
     name = f"name=fine_{uuid4().hex}"  # what was verified is known to later sessions of tests
     fine = (write("fine.yaml", BASE), "--set", "simulation.step=0.0025", "--set", name)

@@ -198,6 +198,7 @@ def test_hulls_after_the_end_of_a_path_are_grey(on_legs):
         assert colors.count(to_hex(run.color)) == len(run.look.places) - count
 
 
+@pytest.mark.long
 def test_the_command_counts_runs_and_logs_apart(podusv: Command):
     run = made_run()
     columns = [run[name][0:76:4] for name in ("time", "x", "y", "psi")]

@@ -316,6 +316,7 @@ def test_its_runs_are_looked_at_where_it_is_not_installed(place, podusv):
     assert "'my-lab' is no file (these end in .py) and no installed package" in said.err
 
 
+@pytest.mark.long
 def test_a_package_that_cannot_be_imported_is_named(place):
     figure = place / "site/my_lab/los.py"
     text = figure.read_text()

@@ -113,7 +113,7 @@ TASKS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("task", one_in(2, [*TASKS]))
 def test_it_has_them_whatever_is_around_it(task):
     source, changes = TASKS[task]
     base = {"control.period": 0.1, "simulation.duration": 5.0}
@@ -314,6 +314,7 @@ def test_an_fmu_is_for_this_machine_or_for_those_asked_for_each_said_before_it(m
     ]
 
 
+@pytest.mark.long
 def test_every_platform_gets_object_code_and_nothing_of_this_machine():
     pieces = ExportedLaw.of(scenario("pid")).pieces
     text = objects.together(pieces)

@@ -133,6 +133,7 @@ def test_processes_that_differ_in_all_but_the_scenario_write_the_same_bytes(tmp_
     assert repeatable(folders[0]) == repeatable(folders[1])
 
 
+@pytest.mark.long
 def test_one_worker_and_many_write_the_same_bytes(tmp_path):
     gains = [50.0, 100.0, 200.0, 400.0, 800.0]
     scenarios = [

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 from identify_samples import HULL, commands_of, fitted, motion, problem, table_of
+from rotation import one_in
 
 import podusv
 from benchmarks import plain_logs
@@ -197,8 +199,9 @@ def turns(times, radius, rate):
     return radius * np.cos(rate * times), radius * np.sin(rate * times)
 
 
-@pytest.mark.parametrize("h", [0.1, 0.2, 0.5, 1.0])
-@pytest.mark.parametrize("duration", [120.0, 600.0])
+@pytest.mark.parametrize(
+    ("h", "duration"), one_in(3, [*product((0.1, 0.2, 0.5, 1.0), (120.0, 600.0))], 2)
+)
 def test_no_white_error_looks_as_if_it_wandered(h, duration):
     times = np.arange(0.0, duration, h)
     rng = np.random.default_rng(int(10 * h + duration))

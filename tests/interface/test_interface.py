@@ -348,6 +348,7 @@ def test_verify_is_a_table_of_numbers():
     assert found["converged"].equals(found["relative_error"] <= 1e-9)
 
 
+@pytest.mark.long
 def test_the_example_in_the_documentation_runs(capsys):
     known: dict[str, Any] = {}
     for code in re.findall(

@@ -73,6 +73,7 @@ def test_a_worker_does_not_run_the_script_that_started_it(spawned, monkeypatch, 
     assert run_all([close_over(3)])[0].result == 9
 
 
+@pytest.mark.long
 def test_parts_of_a_file_cross_by_its_text_though_the_file_is_gone(spawned, config):
     scenario = load(config).scenario
     (config.parent / "laws/my_law.py").unlink()

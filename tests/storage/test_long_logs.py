@@ -128,6 +128,7 @@ def writes_left(path: Path, monkeypatch: pytest.MonkeyPatch, writes: int) -> int
     return opened[0].left
 
 
+@pytest.mark.long
 def test_a_disk_that_is_full_from_any_write_on_is_an_error_in_one_line(tmp_path, monkeypatch):
     path = tmp_path / "log.h5"
     total = 10**9 - writes_left(path, monkeypatch, 10**9)

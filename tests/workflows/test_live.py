@@ -166,7 +166,7 @@ def test_only_what_was_offered_may_move(live: Live, moved: dict[str, Any]) -> No
     assert "not among the values that this page moves" in refused["text"]
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def address() -> Iterator[tuple[str, str]]:
     """Host and path of a page that is served, which Ctrl-C ends with exit code 130."""
     command = [sys.executable, "-m", "podusv_cli", "live", OWN, "--no-open", "--set", *SHORT]

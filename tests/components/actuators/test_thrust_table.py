@@ -263,6 +263,7 @@ def test_a_constant_command_settles_where_drag_is_the_tables_thrust(boat):
     assert run["thrust"][-1] == pytest.approx([10.5, 10.5])
 
 
+@pytest.mark.long
 def test_a_run_has_the_thrust_of_its_commands_compiled_or_not(boat):
     run = podusv.simulate(boat)
     n, T = run["n_part"], run["thrust"]

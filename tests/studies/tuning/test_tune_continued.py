@@ -114,6 +114,7 @@ def validation(folder, gain):
     return Store(folder / FOLDER, about(made))
 
 
+@pytest.mark.long
 def test_runs_of_other_gains_are_replaced_wherever_that_was_killed(tmp_path):
     earlier, later = validation(tmp_path, 2.0), validation(tmp_path, 3.0)
     earlier.open("now")
