@@ -478,7 +478,12 @@ def test_a_log_becomes_rows_of_which_none_is_lost():
     assert len(rows) == count + 100  # of the gap
 
 
-def test_the_command_writes_a_hull_that_a_scenario_takes(tmp_path, boat):
+@pytest.mark.parametrize(
+    "free",
+    ["  free: [inertia, damping.yaw]\n", pytest.param("", marks=pytest.mark.long)],
+    ids=["some", "usual"],
+)
+def test_the_command_writes_a_hull_that_a_scenario_takes(tmp_path, boat, free):
     from podusv_cli.components.vessels.vessel import Vessel
     from podusv_cli.scenario.yaml_text import read
     from podusv_cli.scenario.yaml_tree import plain
@@ -498,7 +503,8 @@ def test_the_command_writes_a_hull_that_a_scenario_takes(tmp_path, boat):
         "extends: podusv:trials/base.yaml\nvessel: {preset: cybership2, N_r: -2.5}\n"
         "actuator: {kind: ideal}\ncontroller: {kind: pid}\n"
         "identify:\n  columns: {time: t, psi: 'psi [deg]'}\n  draws: 5\n"
-        "  logs: [{file: 0.csv}, {file: 1.csv, role: judge}]\n"
+        + free
+        + "  logs: [{file: 0.csv}, {file: 1.csv, role: judge}]\n"
     )
     import podusv
 
