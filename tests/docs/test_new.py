@@ -244,6 +244,7 @@ def test_commands_list_explain_and_draw_it(place):
     assert "identical" in podusv(place, "rerun", "c/los")
 
 
+@pytest.mark.long
 def test_its_command_is_one_of_podusvs(place):
     """In the help, with arguments of its own, and with podusv's exit codes and sentences."""
     reached = {}

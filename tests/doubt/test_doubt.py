@@ -146,6 +146,7 @@ def test_what_the_source_prints_stays(podusv):
     assert {row["key"] for row in rows("turns.csv")} == {"vessel.m"}
 
 
+@pytest.mark.long
 def test_vary_has_the_ranges(podusv):
     vary = "vary: {start.u: {times: {uniform: [0.9, 1.02]}}, start.x: {choice: [1.0, 2.0]}}"
     doubted(podusv, text=WRITTEN.replace("doubt: {", f"doubt: {{{vary}, "))

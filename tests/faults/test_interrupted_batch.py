@@ -5,7 +5,6 @@ import subprocess
 import sys
 
 import pytest
-from rotation import one_in
 
 SWEEP = """
 import podusv
@@ -26,7 +25,8 @@ for turn in range(20):
 """
 
 
-@pytest.mark.parametrize("number", one_in(3, [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]))
+@pytest.mark.long
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_in_a_batch_ends_the_loop_around_it(number, tmp_path):
     command = [sys.executable, "-c", SWEEP]
     pipe = subprocess.PIPE

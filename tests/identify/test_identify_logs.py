@@ -362,6 +362,7 @@ def later(table, delay):
     return replace(table, columns={**table.columns, **moved})
 
 
+@pytest.mark.long
 def test_commands_that_act_two_seconds_later_are_found_and_said(tmp_path, sailed):
     assert Clocks(scenario(), sailed).delay() == (0.0, [])
     early = later(sailed, -2.0)

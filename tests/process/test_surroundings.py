@@ -110,6 +110,7 @@ def test_numba_s_settings_are_those_of_other_programs(tmp_path, name):
     assert (tmp_path / "plain/log.h5").read_bytes() == (tmp_path / "set/log.h5").read_bytes()
 
 
+@pytest.mark.long
 def test_python_without_docstrings_is_refused_in_a_sentence(tmp_path):
     done = told(tmp_path, "run", OWN, options=("-OO",))
     assert (done.returncode, done.stdout) == (1, "")

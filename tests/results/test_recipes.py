@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 from recipe_samples import load_recipe
-from rotation import one_in
 
 RECIPES = ("tuning", "bench", "studies", "identify_coverage")
 load = cache(load_recipe)
@@ -17,7 +16,8 @@ def test_a_page_is_as_its_recipe_fills_it(name: str) -> None:
     assert load(name)["filled"](page) == page
 
 
-@pytest.mark.parametrize("name", one_in(2, ["tuning", "bench"]))
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["tuning", "bench"])
 def test_every_number_of_a_sentence_that_was_changed_is_put_right(name: str) -> None:
     recipe = load(name)
     page = Path(recipe["PAGE"]).read_text()

@@ -15,7 +15,6 @@ from zipfile import ZipFile
 import pytest
 from command_samples import ROOT, one_line
 from installed_sample import install
-from rotation import one_in
 
 import podusv as python
 from podusv_cli.core.errors import ScenarioError
@@ -344,7 +343,8 @@ def test_no_module_of_somebody_s_folder_runs_where_podusv_begins_in_it(module, c
         assert "evil" in one_line(said.stderr)
 
 
-@pytest.mark.parametrize("place", one_in(2, ["gift", "gift/evil-1.0.dist-info"]))
+@pytest.mark.long
+@pytest.mark.parametrize("place", ["gift", "gift/evil-1.0.dist-info"])
 def test_a_notebook_in_somebody_s_folder_takes_nothing_there_for_installed(place):
     as_if_installed()
     for name in ("yaml.py", "signal.py"):  # which Python itself would take

@@ -166,7 +166,7 @@ def test_only_what_was_offered_may_move(live: Live, moved: dict[str, Any]) -> No
     assert "not among the values that this page moves" in refused["text"]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def address() -> Iterator[tuple[str, str]]:
     """Host and path of a page that is served, which Ctrl-C ends with exit code 130."""
     command = [sys.executable, "-m", "podusv_cli", "live", OWN, "--no-open", "--set", *SHORT]
@@ -211,6 +211,7 @@ def test_the_page_is_answered_under_its_own_name_alone(address: tuple[str, str])
     assert asked(host, f"{base}frame", {"Origin": own}) == 200  # and goes on
 
 
+@pytest.mark.long
 def test_the_page_names_no_other_place(address: tuple[str, str]) -> None:
     host, base = address
     connection = HTTPConnection(host, timeout=60)
