@@ -39,7 +39,7 @@ DOUBTED := $(addprefix mu_2017/,$(COMPARISONS)) $(addprefix lefeber_2003/,$(LEFE
     $(addprefix fossen_2023/,$(ALOS)) $(addprefix skjetne_2005/,$(SKJETNE))
 
 .DEFAULT_GOAL := help
-.PHONY: help quick reproduce claim pod sea doubt sweep tune bench-laws docs test test-papers test-all test-faults test-oldest test-newest kernels dist bench checks lint types contracts clean
+.PHONY: help quick reproduce claim pod sea doubt sweep tune bench-laws docs test test-long test-papers test-all test-faults test-oldest test-newest kernels dist bench checks lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -146,13 +146,16 @@ tune: $(VENV)/dev.done ## the committed searches for gains, about half an hour o
 quick: $(VENV)/dev.done ## the test files nearest to what has changed since main
 	@$(BIN)/python tests/quick.py --files $(or $(FILES),25) --numprocesses auto --dist loadfile --no-loadscope-reorder
 
-test: checks ## lint, types, import contracts, all tests but papers and slow ones
+test: checks ## lint, types, import contracts, all tests but long ones, papers and slow ones
 	@$(PYTEST)
+
+test-long: $(VENV)/dev.done ## long tests: whole matrices, long runs, processes and terminals
+	@$(PYTEST) -m "long and not slow and not browser"
 
 test-papers: $(VENV)/dev.done ## whole papers are computed again: the committed verdicts come out
 	@$(PYTEST) -m "papers and not slow"
 
-test-all: checks ## as test, with the papers and the slow tests
+test-all: checks ## as test, with the long tests, the papers and the slow tests
 	@$(PYTEST) -m "not benchmark"
 
 test-faults: $(VENV)/dev.done ## the fault tests with their full counts

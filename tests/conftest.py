@@ -4,7 +4,7 @@ import gc
 import os
 import signal
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, partial
 from pathlib import Path as File
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -38,8 +38,10 @@ from podusv_cli.core.kernel import Vector, bundle, call, kernel
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import TARGET_SIZE
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
+from podusv_cli.engine.running import replay
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.metrics import cost
 from podusv_cli.process.interrupts import SIGNALS
 
 PACKAGE = File(podusv_cli.__file__).parent
@@ -96,6 +98,8 @@ def pytest_configure(config: pytest.Config) -> None:
     settings.load_profile("podusv")
     caches = File(os.environ.get("XDG_CACHE_HOME") or File.home() / ".cache")
     os.environ.setdefault("PODUSV_CACHE", str(caches / "podusv-tests"))
+    cost.replayer = partial(replay.replayer, evaluations=200)  # no test holds the time to anything
+    os.fsync = os.fstat  # nobody cuts the power, and each would wait for the disk
 
 
 def vessel(name: str) -> Vessel:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from podusv_cli.core.errors import StorageError, UsageError
@@ -46,6 +47,7 @@ class Begun:
     others: tuple[Path, ...] = ()
 
 
+@cache
 def starting_points() -> dict[str, str]:
     """Every shipped scenario that is meant to be run, and its description; `FIRST` come first.
 

@@ -254,7 +254,7 @@ def on_a_terminal(monkeypatch, width=80):
         )
 
 
-@pytest.mark.parametrize("laws", [1, 4, 14])
+@pytest.mark.parametrize("laws", [1, 4, pytest.param(14, marks=pytest.mark.long)])
 def test_a_terminal_shows_the_headlines_of_all_laws_beside_each_other(podusv, monkeypatch, laws):
     labels = [f"a_long_name_{i}" if i % 3 == 0 else f"law_{i}" for i in range(laws)]
     several = ", ".join(f"{label}: {{K_Pu: {i + 1.0}}}" for i, label in enumerate(labels))
@@ -270,7 +270,7 @@ def test_a_terminal_shows_the_headlines_of_all_laws_beside_each_other(podusv, mo
     else:  # a line each
         assert [line.split()[0] for line in table[-laws:]] == labels
         assert {len(line.split()) for line in table[-laws:]} == {6}
-    whole = podusv(config, "--out", "y", "-v", "--no-figures").out
+    whole = podusv("x", "--out", "y", "-v", "--no-figures").out
     assert "squared surge force" in whole
     assert "squared" not in out
 
@@ -362,6 +362,7 @@ def test_after_finished_runs_the_last_line_names_the_first_that_is_not_verified(
     assert "may not have converged" not in podusv("x", "--out", "y", "--force").err
 
 
+@pytest.mark.long
 def test_numbers_that_verify_has_found_converged_are_not_doubted_again(podusv, monkeypatch, capsys):
     name = f"name=fine_{uuid4().hex}"  # what was verified is known to later sessions of tests
     fine = (write("fine.yaml", BASE), "--set", "simulation.step=0.0025", "--set", name)

@@ -284,6 +284,7 @@ def test_a_bug_shows_its_trace_and_asks_for_a_report(capsys):
     assert err.endswith(f"ZeroDivisionError: oops\n{PLEASE_REPORT.format('podusv')}\n")
 
 
+@pytest.mark.long
 def test_a_name_that_is_no_text_is_shown_escaped(tmp_path):
     path = os.fsencode(tmp_path) + b"/\xff.yaml"
     with open(path, "w", encoding="utf-8") as file:
@@ -335,11 +336,16 @@ def test_completion_is_installed_once_for_the_shell_that_asks(tmp_path: Path) ->
     ("typed", "offered"),
     [
         ("podusv ", {*cli.COMMANDS, "sweep"}),
-        ("podusv sweep ", {"run", "status", "report", "merge", "draw", "export"}),
         ("podusv sweep run --un", {"--until"}),
-        ("podusv ver", {"verify"}),
-        ("podusv run --al", {"--allow-large"}),
-        ("podusv run --s", {"--set"}),
+        *(
+            pytest.param(*long, marks=pytest.mark.long)
+            for long in (
+                ("podusv sweep ", {"run", "status", "report", "merge", "draw", "export"}),
+                ("podusv ver", {"verify"}),
+                ("podusv run --al", {"--allow-large"}),
+                ("podusv run --s", {"--set"}),
+            )
+        ),
     ],
 )
 def test_commands_and_options_are_offered_and_nothing_heavy_is_imported(
@@ -427,6 +433,7 @@ def test_a_command_of_another_name_is_pointed_to(podusv, word: str) -> None:
     assert f"No such command '{word}': podusv {named} " in " ".join(said.err.split())
 
 
+@pytest.mark.long
 def test_what_was_completed_is_kept_until_podusv_changes(tmp_path: Path, monkeypatch) -> None:
     typed = "podusv run --set controller.k_z"
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path / "cache"))

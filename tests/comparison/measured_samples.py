@@ -39,7 +39,7 @@ def numbers(done, label):
 
 def made_run(name="run"):
     alone = {"controllers": None, "controller": {"kind": "momentum_vector"}}
-    return p.run("task.yaml", alone, out=name)
+    return p.run("task.yaml", alone, out=name, figures=False)
 
 
 def warnings_of(done):

@@ -11,6 +11,7 @@ from command_samples import Command
 from drawn_samples import drawn, hulls
 from matplotlib.colors import to_hex
 from measured_samples import METRICS, TASK, compared, log, made_run, numbers, warnings_of
+from rotation import one_in
 from scenario_samples import write
 
 import podusv as p
@@ -56,7 +57,7 @@ CLOCKS = {
 }
 
 
-@pytest.mark.parametrize("clock", CLOCKS)
+@pytest.mark.parametrize("clock", one_in(2, [*CLOCKS]))
 def test_start_takes_the_first_position_for_the_first_instant_of_the_run(clock):
     """The run's own track, 5 m away and by another clock, is 0 m from the run once it is laid."""
     head, told, shift = CLOCKS[clock]
@@ -91,6 +92,7 @@ def test_place_leaves_the_clock_as_it_is():
 # A log without headings
 
 
+@pytest.mark.long
 def test_a_log_without_a_heading_is_compared_by_its_positions(podusv: Command):
     run = made_run()
     t, x, y = (run[name][0:76:4] for name in ("time", "x", "y"))
@@ -196,6 +198,7 @@ def test_hulls_after_the_end_of_a_path_are_grey(on_legs):
         assert colors.count(to_hex(run.color)) == len(run.look.places) - count
 
 
+@pytest.mark.long
 def test_the_command_counts_runs_and_logs_apart(podusv: Command):
     run = made_run()
     columns = [run[name][0:76:4] for name in ("time", "x", "y", "psi")]

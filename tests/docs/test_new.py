@@ -79,6 +79,7 @@ def test_a_vessel_is_written_with_a_task(podusv):
     assert "is a vessel of podusv" in podusv("new", "vessel", "otter").err
 
 
+@pytest.mark.long
 def test_a_paper_is_written_as_a_folder_that_compares_and_draws(podusv):
     said = podusv("new", "paper", "our_own")
     assert "next: podusv compare our_own/task.yaml" in said.out
@@ -243,6 +244,7 @@ def test_commands_list_explain_and_draw_it(place):
     assert "identical" in podusv(place, "rerun", "c/los")
 
 
+@pytest.mark.long
 def test_its_command_is_one_of_podusvs(place):
     """In the help, with arguments of its own, and with podusv's exit codes and sentences."""
     reached = {}
@@ -268,6 +270,7 @@ def test_a_bug_in_a_package_s_command_is_one_of_the_package(place):
     assert "This is a bug in my-lab. Please report it" in said
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "thing", "says"),
     [
@@ -314,6 +317,7 @@ def test_its_runs_are_looked_at_where_it_is_not_installed(place, podusv):
     assert "'my-lab' is no file (these end in .py) and no installed package" in said.err
 
 
+@pytest.mark.long
 def test_a_package_that_cannot_be_imported_is_named(place):
     figure = place / "site/my_lab/los.py"
     text = figure.read_text()

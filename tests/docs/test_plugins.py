@@ -147,7 +147,13 @@ LOOKS = {
 }
 
 
-@pytest.mark.parametrize("words", LOOKS.values(), ids=LOOKS)
+@pytest.mark.parametrize(
+    "words",
+    [
+        pytest.param(words, id=n, marks=[pytest.mark.long] * (n != "plot"))
+        for n, words in LOOKS.items()
+    ],
+)
 def test_looking_at_finished_runs_makes_no_scenario_and_no_loop(podusv, monkeypatch, words):
     podusv("compare", put(TWO), "--out", "c", *QUIET)
     shutil.rmtree("laws")
@@ -168,6 +174,7 @@ def without_about(folder):
     path.write_text(json.dumps(whole))
 
 
+@pytest.mark.long
 def test_a_run_of_before_is_looked_at_where_its_components_are_at_hand(podusv):
     podusv("compare", put(TWO), "--out", "c", *QUIET)
     shutil.move("laws/my_law.py", "own.py")

@@ -21,16 +21,12 @@ from command_samples import ROOT, Command, commanded
 from podusv_cli.engine.running import thread as march
 from podusv_cli.storage.run_folder import open_run
 
-PAGES = (
-    "README.md",
-    "docs/tutorial.md",
-    "docs/write_your_law.md",
-    "docs/vessel.md",
-    "docs/start.md",
-    "docs/papers.md",
-    "docs/station_keeping.md",
-)
+PAGES = ("README.md", "docs/write_your_law.md", "docs/vessel.md", "docs/start.md")
 LONG = [
+    pytest.param(page, marks=pytest.mark.long)
+    for page in ("docs/tutorial.md", "docs/papers.md", "docs/station_keeping.md")
+]
+SLOW = [
     pytest.param(page, marks=pytest.mark.slow)
     for page in (
         "docs/my_boat.md",
@@ -96,7 +92,7 @@ def podusv(
     return commanded(monkeypatch, capsys)
 
 
-@pytest.mark.parametrize("page", [*PAGES, *LONG])
+@pytest.mark.parametrize("page", [*PAGES, *LONG, *SLOW])
 def test_commands_of_a_page_print_what_it_shows(page: str, podusv: Command) -> None:
     write_files(page)
     assert len(list(dialogues(page))) > 1

@@ -70,6 +70,7 @@ def test_a_page_of_the_reference_has_every_name(page: str, reference: Any) -> No
     assert coded(reference.PAGES[page]()) == NAMES[page]()
 
 
+@pytest.mark.long
 def test_the_reference_has_every_key_kind_and_preset(reference: Any) -> None:
     shown = coded(reference.scenario_page())
     for section, key in SCENARIO.keys.items():

@@ -128,12 +128,14 @@ def test_draws_are_judged_as_algebra_has_it(out):
     assert int(rows("doubt.csv", out[0])[0]["kept"]) == kept
 
 
+@pytest.mark.long
 def test_one_process_or_two_find_the_same(out, podusv):
     doubted(podusv, workers=2)
     for name in ("turns.csv", "draws.csv", "doubt.json"):
         assert Path("out", name).read_bytes() == (out[0] / name).read_bytes()
 
 
+@pytest.mark.long
 def test_what_the_source_prints_stays(podusv):
     stays = "printed: [start, vessel.X_u, controllers.a, disturbance, simulation]"
     text = WRITTEN.replace(STAY, stays)
@@ -144,6 +146,7 @@ def test_what_the_source_prints_stays(podusv):
     assert {row["key"] for row in rows("turns.csv")} == {"vessel.m"}
 
 
+@pytest.mark.long
 def test_vary_has_the_ranges(podusv):
     vary = "vary: {start.u: {times: {uniform: [0.9, 1.02]}}, start.x: {choice: [1.0, 2.0]}}"
     doubted(podusv, text=WRITTEN.replace("doubt: {", f"doubt: {{{vary}, "))
@@ -152,6 +155,7 @@ def test_vary_has_the_ranges(podusv):
     assert all(0.45 <= float(row["start.u"]) <= 0.51 for row in rows("draws.csv"))
 
 
+@pytest.mark.long
 def test_a_hull_is_tried_as_a_whole(podusv):
     hulls = "doubt: {hulls: [cybership1], "
     text = WRITTEN.replace("doubt: {", hulls).replace("<=", ">=", 1)
@@ -192,6 +196,7 @@ def test_python_has_the_same_table(out):
     assert table.loc["slow", "nearest"] == rows("doubt.csv", folder)[0]["nearest"]
 
 
+@pytest.mark.long
 def test_a_comparison_says_what_its_verdicts_hang_on(podusv, out):
     Path("adrift.yaml").write_text(WRITTEN, "utf-8")
     done = podusv(
@@ -256,6 +261,7 @@ def test_a_study_hangs_on_what_it_does_not_draw(podusv):
     assert apart.read_bytes() == within.read_bytes()
 
 
+@pytest.mark.long
 def test_the_scenario_itself_is_judged_as_a_comparison_judges_it(podusv):
     """Also by a number that only a comparison has: operations of the law."""
     claim = "claims:\n  count: {says: Few., expect: a.law_operations <= 1000}\n"
@@ -287,6 +293,7 @@ main()
 """
 
 
+@pytest.mark.long
 def test_an_interrupt_keeps_what_was_tried(podusv):
     """While values are moved one at a time, so that no draw is made."""
     Path("adrift.yaml").write_text(WRITTEN, "utf-8")
@@ -300,6 +307,7 @@ def test_an_interrupt_keeps_what_was_tried(podusv):
     assert not rows("draws.csv")
 
 
+@pytest.mark.long
 def test_a_verdict_that_some_value_leaves_open_is_robust_where_it_can_tell(podusv):
     """A run of 5 s has no window from 8 s to 10 s."""
     text = WRITTEN.replace("expect: max(abs(a.v))", "expect: 'max(abs(a.v), 8, 10)")

@@ -29,6 +29,7 @@ def test_arrays_have_their_committed_bits(name):
     assert {"adaptive_neural V", "adaptive_neural W_star_u", "adaptive_neural x"} <= {*made}
 
 
+@pytest.mark.long
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="names processors of x86")
 def test_they_are_the_same_where_libraries_compute_as_on_another_processor():
     done = subprocess.run(

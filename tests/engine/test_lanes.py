@@ -385,6 +385,7 @@ def test_a_march_that_is_abandoned_writes_to_memory_that_nobody_else_has(kind: A
     assert len(places) == 1
 
 
+@pytest.mark.long
 def test_any_failure_of_the_vectoriser_is_a_reason_to_march_one_by_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -1,7 +1,7 @@
 """Two ways to one answer, at numbers that nobody chose: they agree to the last bit.
 
-A pair is a function of a drawn scenario and an empty folder. `make test` takes some draws of each,
-`make test-all` hundreds.
+A pair is a function of a drawn scenario and an empty folder. `make test` takes a few draws of each,
+`make test-long` some, `make test-all` hundreds.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from podusv_cli.workflows.request import Request
 
 Pair = Callable[[Drawn, Path], None]
 PAIRS: dict[str, Pair] = {}
-FEW, MANY = len(KINDS), 240  # draws of a pair in `make test`, and in `make test-all`
+FEW, MANY = len(KINDS), 240  # draws of a pair in `make test-long`, and in `make test-all`
 DRAWS = {"exported_law": 2, "plain_python": 4, "rerun_folder": 4}  # of those that take longer
 
 
@@ -288,7 +288,7 @@ def value_at(scenario: Scenario, key: str) -> Any:
 
 
 def test_the_draws_are_no_convenient_numbers():
-    """Among those of `make test` every time divides another one here, and does not there."""
+    """Among those of `make test-long` every time divides another one here, and does not there."""
     scenarios = [Drawn(seed).scenario() for seed in range(4 * FEW)]
     grids = [scenario.time_grid() for scenario in scenarios]
     held = [grid for grid in grids if grid.hold_every]
@@ -310,7 +310,11 @@ def test_the_draws_are_no_convenient_numbers():
 
 @pytest.mark.parametrize(
     ("name", "seed"),
-    [(n, i) for at, n in enumerate(PAIRS) for i in range(at % 2, DRAWS.get(n, FEW), 2)],
+    [
+        pytest.param(n, i, marks=[pytest.mark.long] * ((at + i // 2) % 3 != 2))
+        for at, n in enumerate(PAIRS)
+        for i in range(at % 2, DRAWS.get(n, FEW), 2)
+    ],
 )
 def test_both_ways_have_the_same_bits(name, seed, tmp_path):
     PAIRS[name](Drawn(seed), tmp_path)

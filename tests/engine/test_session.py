@@ -50,7 +50,9 @@ def steered(session: Session, count: int = 10_000) -> Observation:
     return seen
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.long] * n.startswith("pods")) for n in SCENARIOS]
+)
 def test_a_session_has_the_bits_of_the_run_that_it_leaves(name):
     """So does one that ends early, whose run is as long as it was."""
     source, changes = SCENARIOS[name]

@@ -87,6 +87,7 @@ def test_a_damaged_or_foreign_file_gives_no_kernels(file: Path) -> None:
     assert found(file, None) == 0
 
 
+@pytest.mark.long
 def test_how_many_kernels_come_with_podusv_and_that_they_are_what_numba_makes_now() -> None:
     """That some are missing is no failure: they are made anew at the end of a change."""
     command = [sys.executable, "-m", "benchmarks.ship_kernels", "--check", "--again", "4"]
@@ -203,6 +204,7 @@ def log_digest(folder: Path, cache: Path, *, numba: bool, law: str = "") -> str:
     return hashlib.sha256((folder / "log.h5").read_bytes()).hexdigest()
 
 
+@pytest.mark.long
 def test_without_numba_runs_have_the_same_bytes_and_a_law_of_ones_own_is_told(tmp_path) -> None:
     if not ship_kernels.pieces_of([podusv_loaded()]).keys() <= shipped._kernels().keys():
         pytest.skip("no kernels.xz with the kernels of this scenario")

@@ -71,6 +71,7 @@ def calls(monkeypatch):
     return counts
 
 
+@pytest.mark.long
 def test_a_package_is_scanned_once_a_process(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", SCANS], cwd=tmp_path, capture_output=True, text=True, check=True

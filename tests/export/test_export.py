@@ -35,6 +35,7 @@ from export_samples import (
 from exported_laws import Unit
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
+from rotation import one_in
 
 import podusv
 from podusv_cli.core.errors import StorageError, UsageError
@@ -49,6 +50,7 @@ from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.storage import manifest
 from podusv_cli.workflows import export as workflow
 
+UPDATES = ("after", "before")
 LAWS, QUICK = sorted(KINDS.keys() - {"maneuvering"}), ("alos", "pose_pid")  # that is refused
 FED = ("controllers=null", "controller={kind: pose_pid, load: estimated}")
 MANEUVERING = ("controllers=null", "controller={kind: maneuvering}", "control.period=0.1")
@@ -61,8 +63,7 @@ def sound(tmp_path_factory):
     return exported(tmp_path_factory.mktemp("sound") / "law")
 
 
-@pytest.mark.parametrize("update", ["after", "before"])
-@pytest.mark.parametrize("kind", LAWS)
+@pytest.mark.parametrize(("kind", "update"), one_in(3, [(k, u) for k in LAWS for u in UPDATES]))
 def test_a_law_by_itself_has_the_bits_of_its_run(kind, update):
     """Demand, signals and memory of every sample, called as the C files call it."""
     law = ExportedLaw.of(scenario(kind, **{"control.update": update}))
@@ -112,7 +113,7 @@ TASKS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("task", one_in(2, [*TASKS]))
 def test_it_has_them_whatever_is_around_it(task):
     source, changes = TASKS[task]
     base = {"control.period": 0.1, "simulation.duration": 5.0}
@@ -253,7 +254,7 @@ AROUND: dict[str, tuple[str, dict[str, Any], bool]] = {
 
 
 @needs_cc
-@pytest.mark.parametrize("around", AROUND)
+@pytest.mark.parametrize("around", one_in(2, [*AROUND]))
 def test_an_fmu_begins_where_the_run_does_and_asks_for_loads_that_it_cannot_know(tmp_path, around):
     """As another program reads it: modelDescription.xml, the library, and check.csv."""
     source, changes, loads = AROUND[around]
@@ -313,6 +314,7 @@ def test_an_fmu_is_for_this_machine_or_for_those_asked_for_each_said_before_it(m
     ]
 
 
+@pytest.mark.long
 def test_every_platform_gets_object_code_and_nothing_of_this_machine():
     pieces = ExportedLaw.of(scenario("pid")).pieces
     text = objects.together(pieces)
@@ -501,7 +503,11 @@ def test_code_that_a_folder_brings_along_is_run_with_trust_alone(
 
 
 @pytest.mark.parametrize(
-    "kind", [pytest.param(law, marks=() if law in QUICK else pytest.mark.slow) for law in LAWS]
+    "kind",
+    [
+        *one_in(2, QUICK),
+        *(pytest.param(law, marks=pytest.mark.slow) for law in LAWS if law not in QUICK),
+    ],
 )
 def test_fmpy_finds_no_fault_and_the_bits_of_the_run(tmp_path, kind):
     folder = export_law(Path(SOURCE), tmp_path / "law", task(kind))

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from conftest import ROOMS, corrected, example, kinds, needed_by
+from rotation import one_in
 from scenario_samples import SOUND
 
 from podusv_cli.comparison.log_difference import compare
@@ -102,7 +103,7 @@ def both(loop: ClosedLoop, hold_every: int) -> tuple[Any, Any]:
     return one, other
 
 
-@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize("part", one_in(3, [*PARTS]))
 def test_machine_code_and_plain_python_agree_to_the_last_bit(part):
     law = PARTS[part].get("controller", AdaptiveNeural())
     needed = needed_by(law, SaturatedFull())
@@ -118,6 +119,7 @@ def test_machine_code_and_plain_python_agree_to_the_last_bit(part):
 # --- again, elsewhere, beside others
 
 
+@pytest.mark.long
 def test_processes_that_differ_in_all_but_the_scenario_write_the_same_bytes(tmp_path):
     config = tmp_path / "a.yaml"
     config.write_text(SOUND + "simulation: {duration: 5.0}\n")
@@ -131,6 +133,7 @@ def test_processes_that_differ_in_all_but_the_scenario_write_the_same_bytes(tmp_
     assert repeatable(folders[0]) == repeatable(folders[1])
 
 
+@pytest.mark.long
 def test_one_worker_and_many_write_the_same_bytes(tmp_path):
     gains = [50.0, 100.0, 200.0, 400.0, 800.0]
     scenarios = [

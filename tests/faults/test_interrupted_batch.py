@@ -25,6 +25,7 @@ for turn in range(20):
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_in_a_batch_ends_the_loop_around_it(number, tmp_path):
     command = [sys.executable, "-c", SWEEP]

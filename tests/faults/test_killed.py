@@ -115,6 +115,7 @@ def test_no_piece_of_code_is_left_half_written(tmp_path, monkeypatch):
     assert object_cache._read(path) == piece
 
 
+@pytest.mark.long
 def test_what_others_may_be_making_is_left_alone(podusv):
     """Parts of a process that lives or of another machine, and names that only look like parts."""
     mine = temporary_name()

@@ -172,6 +172,7 @@ def test_a_package_s_digest_tells_where_its_files_are(tmp_path, monkeypatch):
     assert plugins._package_digest([("paths", point)]) != before
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("podusv")
 def test_a_scenario_with_a_plug_in_is_run_in_another_process():
     scenario = podusv_python.load(put(law=LAW + "# sent to another process\n"))

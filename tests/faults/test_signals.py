@@ -136,6 +136,7 @@ def lose_the_terminal(*words: str, until: str) -> None:
             os.killpg(process, signal.SIGKILL)
 
 
+@pytest.mark.long
 def test_a_lost_terminal_ends_a_run_and_keeps_it():
     """As a lost ssh does; nothing that is still to be printed stands in the way."""
     words = ("run", write("long.yaml", LONG), "--out", "x", "--no-figures")

@@ -92,6 +92,7 @@ def test_of_those_that_replace_the_last_one_stays(podusv, place):
         assert not left_over()
 
 
+@pytest.mark.long
 def test_figures_that_are_drawn_at_once_are_whole(podusv, before):
     said = podusv("plot", "x", "--out", "figures")
     new = files(Path())
@@ -104,6 +105,7 @@ def test_figures_that_are_drawn_at_once_are_whole(podusv, before):
         assert not left_over()
 
 
+@pytest.mark.long
 def test_a_run_that_is_replaced_while_it_is_drawn_is_drawn_or_refused(podusv):
     """What is read across the change is seen to be damaged.
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from command_samples import BASE, LONG, PATIENCE, gone, under_way, wait_for, write
+from rotation import one_in
 
 from podusv_cli.process.workers import run_all
 from podusv_cli.storage import manifest
@@ -69,7 +70,7 @@ def choke(said: bytes, progress: Any) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-@pytest.mark.parametrize("said", [b"\0", b"\0\0\1\0half", b"\xff\xff\xff\xf0"])
+@pytest.mark.parametrize("said", one_in(3, [b"\0\0\1\0half", b"\0", b"\xff\xff\xff\xf0"]))
 def test_a_message_cut_short_is_a_worker_killed(said):
     outcomes = run_all([partial(choke, said), partial(pow, 3)], workers=1)
     assert "exit code -9, 2 times" in outcomes[0].failure

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from conftest import PACKAGE, VESSELS
+from rotation import one_in
 from test_sized_defaults import CATAMARAN, loaded
 
 from podusv_cli.components.disturbances.calm import Calm
@@ -205,7 +206,9 @@ def test_no_vessel_that_podusv_brings_along_is_in_another_unit(name):
     assert not list(other_unit.search(Case.of(boat(f"vessel={{preset: {name}}}"))))
 
 
-@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: f"{path.parent.name}/{path.stem}")
+@pytest.mark.parametrize(
+    "path", one_in(3, SHIPPED, 1), ids=lambda path: f"{path.parent.name}/{path.stem}"
+)
 def test_no_scenario_that_podusv_brings_along_is_of_another_hull_or_unit(path):
     try:
         scenario = load(path).scenario
@@ -223,7 +226,9 @@ def test_no_scenario_that_podusv_brings_along_is_of_another_hull_or_unit(path):
 
 @pytest.mark.parametrize(
     "path",
-    [one for one in SHIPPED if one.parent.name in ("mu_2017", "fossen_2003", "lefeber_2003")],
+    one_in(
+        3, [one for one in SHIPPED if one.parent.name in ("mu_2017", "fossen_2003", "lefeber_2003")]
+    ),
     ids=lambda path: f"{path.parent.name}/{path.stem}",
 )
 def test_scenarios_of_papers_have_the_numbers_with_which_their_results_were_made(path):

@@ -101,6 +101,7 @@ def test_gusts_and_wandering_have_2_percent_of_full_thrust(known):
         assert rms == pytest.approx([1.0, 1.0, 2.0], rel=0.1)
 
 
+@pytest.mark.long
 def test_a_search_does_not_end_in_steps_of_the_filter_where_sway_changes_its_sign(tmp_path):
     """With slopes over 1e-4 of the priors' deviations the search takes 60 rounds or more here."""
     cell = coverage.CoverageSet(5000, 10, "commands", 0.02, "wandering", "otter")

@@ -80,6 +80,7 @@ def test_a_hull_that_predicts_worse_than_the_vessel_is_written_with_force_alone(
     assert not (hull / "refused.yaml").exists()
 
 
+@pytest.mark.long
 def test_a_refused_hull_says_so_in_json_and_in_python(boats, tmp_path, podusv):
     out = podusv(
         "identify", boats / "boat.yaml", "--out", tmp_path / "a", "--json", "--no-figures"

@@ -220,7 +220,9 @@ PUSHED = np.repeat([10.0, 30.0, 50.0, 20.0], 100)  # N
     ("push", "noise", "determined"),
     [
         pytest.param(PUSHED, (0.1, 0.02, 0.01), {"m11", "X_u"}, marks=pytest.mark.slow),
-        (PUSHED, (0.0, 0.0, 0.0), {"m11", "X_u"}),  # as only simulators make it
+        pytest.param(  # as only simulators make it
+            PUSHED, (0.0, 0.0, 0.0), {"m11", "X_u"}, marks=pytest.mark.long
+        ),
         (STILL, (0.01, 0.005, 0.002), set()),  # moored
     ],
 )
@@ -476,7 +478,12 @@ def test_a_log_becomes_rows_of_which_none_is_lost():
     assert len(rows) == count + 100  # of the gap
 
 
-def test_the_command_writes_a_hull_that_a_scenario_takes(tmp_path, boat):
+@pytest.mark.parametrize(
+    "free",
+    ["  free: [inertia, damping.yaw]\n", pytest.param("", marks=pytest.mark.long)],
+    ids=["some", "usual"],
+)
+def test_the_command_writes_a_hull_that_a_scenario_takes(tmp_path, boat, free):
     from podusv_cli.components.vessels.vessel import Vessel
     from podusv_cli.scenario.yaml_text import read
     from podusv_cli.scenario.yaml_tree import plain
@@ -496,7 +503,8 @@ def test_the_command_writes_a_hull_that_a_scenario_takes(tmp_path, boat):
         "extends: podusv:trials/base.yaml\nvessel: {preset: cybership2, N_r: -2.5}\n"
         "actuator: {kind: ideal}\ncontroller: {kind: pid}\n"
         "identify:\n  columns: {time: t, psi: 'psi [deg]'}\n  draws: 5\n"
-        "  logs: [{file: 0.csv}, {file: 1.csv, role: judge}]\n"
+        + free
+        + "  logs: [{file: 0.csv}, {file: 1.csv, role: judge}]\n"
     )
     import podusv
 

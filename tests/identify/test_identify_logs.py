@@ -362,6 +362,7 @@ def later(table, delay):
     return replace(table, columns={**table.columns, **moved})
 
 
+@pytest.mark.long
 def test_commands_that_act_two_seconds_later_are_found_and_said(tmp_path, sailed):
     assert Clocks(scenario(), sailed).delay() == (0.0, [])
     early = later(sailed, -2.0)
@@ -390,6 +391,7 @@ def test_port_and_starboard_exchanged(sailed):
         Clocks(scenario(), turned).delay()
 
 
+@pytest.mark.long
 def test_a_whole_log_counted_to_port_is_found_by_its_commands(tmp_path, sailed):
     c = sailed.columns
     enu = {
@@ -409,6 +411,7 @@ def test_a_whole_log_counted_to_port_is_found_by_its_commands(tmp_path, sailed):
     assert log.record.rows == pytest.approx(log_of(sailed, Ideal(), 0.05).record.rows)
 
 
+@pytest.mark.long
 def test_a_hull_ten_times_too_heavy_is_doubted(sailed):
     inertia = {"m": 10.0 * HULL.m, "I_z": 10.0 * HULL.I_z, "X_udot": 10.0 * HULL.X_udot}
     heavy = HULL.changed({**inertia, "Y_vdot": 10.0 * HULL.Y_vdot, "N_rdot": 10.0 * HULL.N_rdot})
@@ -463,6 +466,7 @@ def test_all_logs_are_looked_at_before_one_of_them_ends_the_command(podusv, tmp_
     assert not (tmp_path / "hull").exists()
 
 
+@pytest.mark.long
 def test_a_log_for_judging_is_not_moved_by_what_all_of_it_says(tmp_path, sailed):
     early = later(sailed, -2.0)
     path = written(tmp_path / "a.csv", {"time": early.times, **early.columns})

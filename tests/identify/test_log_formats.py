@@ -67,6 +67,7 @@ def test_sentences_that_are_damaged_are_left_out_and_counted(tmp_path):
         contents_of(nmea(tmp_path, void))
 
 
+@pytest.mark.long
 def test_damaged_sentences_end_in_a_sentence(tmp_path):
     rng, text = random.Random(5), "\r\n".join(sentences(30))
     for _ in range(300):

@@ -80,5 +80,5 @@ def test_a_schedule_takes_pulses(tmp_path):
     (tmp_path / "c.csv").write_text("t,n_part_1 [us],n_part_2 [us]\n0,1700,1300\n10,1700,1300\n")
     text = PWM_BOAT.replace("SPAN", "400").replace("{kind: pid}", "{kind: schedule, file: c.csv}")
     (tmp_path / "boat.yaml").write_text(text)
-    run = podusv.run(tmp_path / "boat.yaml", {"identify": None})
+    run = podusv.simulate(tmp_path / "boat.yaml", {"identify": None})
     assert run["n_part"][-1] == pytest.approx([0.5, -0.5], abs=1e-6)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 from identify_samples import HULL, commands_of, fitted, motion, problem, table_of
+from rotation import one_in
 
 import podusv
 from benchmarks import plain_logs
@@ -216,8 +218,9 @@ def turns(times, radius, rate):
     return radius * np.cos(rate * times), radius * np.sin(rate * times)
 
 
-@pytest.mark.parametrize("h", [0.1, 0.2, 0.5, 1.0])
-@pytest.mark.parametrize("duration", [120.0, 600.0])
+@pytest.mark.parametrize(
+    ("h", "duration"), one_in(3, [*product((0.1, 0.2, 0.5, 1.0), (120.0, 600.0))], 2)
+)
 def test_no_white_error_looks_as_if_it_wandered(h, duration):
     times = np.arange(0.0, duration, h)
     rng = np.random.default_rng(int(10 * h + duration))
@@ -276,6 +279,7 @@ def boat_log(noise, *, compass=0.0, wander=0.0, seed=3):
     return log_of(table_of(times, states, commands, noise=noise, seed=seed), Ideal(), 0.1)
 
 
+@pytest.mark.long
 def test_which_numbers_are_looked_for():
     """By the logs, unless the deviation is given; 0 looks for none."""
     calm, wandering = boat_log((0.01, 0.005, 0.002)), boat_log((0.01, 0.005, 0.002), wander=1.0)

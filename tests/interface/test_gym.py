@@ -328,6 +328,7 @@ def test_gymnasium_makes_environments_by_name():
     assert several.num_envs == 3
 
 
+@pytest.mark.long
 def test_gymnasium_alone_finds_the_environment_by_module_and_name():
     """In a process that has imported nothing of podusv."""
     asked = (

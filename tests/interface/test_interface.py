@@ -72,7 +72,9 @@ def test_the_package_is_a_command_too():
     assert python("-m", "podusv", "--version").stdout == f"podusv {podusv.__version__}\n"
 
 
-@pytest.mark.parametrize("module", [scenarios, functions, session, studies])
+@pytest.mark.parametrize(
+    "module", [scenarios, pytest.param(functions, marks=pytest.mark.long), session, studies]
+)
 def test_the_examples_in_the_docstrings_run(module):
     found = doctest.testmod(module, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
     assert found.failed == 0
@@ -346,6 +348,7 @@ def test_verify_is_a_table_of_numbers():
     assert found["converged"].equals(found["relative_error"] <= 1e-9)
 
 
+@pytest.mark.long
 def test_the_example_in_the_documentation_runs(capsys):
     known: dict[str, Any] = {}
     for code in re.findall(

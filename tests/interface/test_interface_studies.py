@@ -50,6 +50,7 @@ def test_a_study_of_a_grid_keeps_its_cells() -> None:
     assert len(study.table) == 12
 
 
+@pytest.mark.long
 def test_a_study_is_opened_and_continued_from_its_folder() -> None:
     claimed = {**SWEEP, "draws": 2, "claims": {"C1": CLAIM}}
     study = podusv.sweep(SHORT, {"sweep": claimed}, out="s", figures=False)
@@ -64,6 +65,7 @@ def test_a_study_is_opened_and_continued_from_its_folder() -> None:
         podusv.sweep(SHORT, out="t")
 
 
+@pytest.mark.long
 def test_a_search_gives_gains_by_law_and_ranks() -> None:
     pytest.importorskip("optuna")
     search = {

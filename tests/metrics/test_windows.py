@@ -69,6 +69,7 @@ main()
 """
 
 
+@pytest.mark.long
 def test_a_window_of_awkward_numbers_needs_no_numba_and_is_what_the_log_says(
     tmp_path: Path,
 ) -> None:

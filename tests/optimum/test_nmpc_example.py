@@ -84,6 +84,7 @@ def test_the_observer_learns_a_constant_load_as_its_poles_say(controller):
         np.testing.assert_allclose(controller.load, (1.0 - unknown) * load, atol=0.02)
 
 
+@pytest.mark.long
 def test_a_session_that_it_steers_leaves_a_run_that_repeats(tmp_path):
     changes = {"simulation.duration": 3.0, "metrics.windows": {}}
     session = podusv.open_session(TASK, changes, period=nmpc.PERIOD)

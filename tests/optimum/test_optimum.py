@@ -467,6 +467,7 @@ controller: {kind: pose_pid}
 """
 
 
+@pytest.mark.long
 def test_an_optimum_with_a_sway_force_is_repeated_and_beats_the_law(podusv):
     pytest.importorskip("casadi", reason=REASON)
     Path("a.yaml").write_text(AWAY)

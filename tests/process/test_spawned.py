@@ -73,6 +73,7 @@ def test_a_worker_does_not_run_the_script_that_started_it(spawned, monkeypatch, 
     assert run_all([close_over(3)])[0].result == 9
 
 
+@pytest.mark.long
 def test_parts_of_a_file_cross_by_its_text_though_the_file_is_gone(spawned, config):
     scenario = load(config).scenario
     (config.parent / "laws/my_law.py").unlink()
@@ -85,6 +86,7 @@ def test_parts_of_a_file_cross_by_its_text_though_the_file_is_gone(spawned, conf
     assert whole.result[0] == Scenario.__qualname__
 
 
+@pytest.mark.long
 def test_a_comparison_has_the_bytes_of_forked_workers(config, monkeypatch):
     """Logs, figures and tables, with a law, a metric and a figure of a file."""
     made = {}
@@ -119,6 +121,7 @@ def make_unit(plan, unit, tell):
     }, "numba" in sys.modules
 
 
+@pytest.mark.long
 def test_workers_compile_nothing_that_this_process_compiled(spawned, config, monkeypatch):
     """One compilation a machine: of a law that nobody has compiled yet, each piece once."""
     config.write_text(STUDY)
@@ -143,6 +146,7 @@ def test_workers_compile_nothing_that_this_process_compiled(spawned, config, mon
     assert len([name for name in compiled if "CrossTrack" in name]) == len(mine)
 
 
+@pytest.mark.long
 def test_a_study_has_the_bytes_of_forked_workers(config, monkeypatch, tmp_path):
     config.write_text(STUDY)
     made = []

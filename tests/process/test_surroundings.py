@@ -40,6 +40,7 @@ def place(tmp_path_factory):
 NO_MODULE = {"MPLBACKEND": INLINE}, {"MPLBACKEND": "no_backend"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("settings", NO_MODULE, ids=lambda s: s["MPLBACKEND"])
 def test_a_notebook_s_backend_keeps_no_figure_from_being_drawn(place, settings):
     done = told(place, "plot", "r", "--figure", "trajectory", **settings)
@@ -58,6 +59,7 @@ assert (run.folder / "figures/trajectory.png").exists()
 """
 
 
+@pytest.mark.long
 def test_python_draws_where_a_notebook_s_backend_is_not_installed(place):
     if find_spec("matplotlib_inline"):
         pytest.skip("matplotlib_inline is installed")
@@ -91,6 +93,7 @@ class Push(Controller):
 """.replace('\\"', '"')
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["NUMBA_DISABLE_JIT", "NUMBA_DEBUGINFO", "NUMBA_ENABLE_PROFILING"])
 def test_numba_s_settings_are_those_of_other_programs(tmp_path, name):
     """Kernels are compiled anew in each: the law's number is another one, and so is the cache."""
@@ -107,6 +110,7 @@ def test_numba_s_settings_are_those_of_other_programs(tmp_path, name):
     assert (tmp_path / "plain/log.h5").read_bytes() == (tmp_path / "set/log.h5").read_bytes()
 
 
+@pytest.mark.long
 def test_python_without_docstrings_is_refused_in_a_sentence(tmp_path):
     done = told(tmp_path, "run", OWN, options=("-OO",))
     assert (done.returncode, done.stdout) == (1, "")

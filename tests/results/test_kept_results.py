@@ -30,6 +30,7 @@ exit 0
 KEPT = ("comparison.csv", "claims.json", *(f"figures/{n}.png" for n in FIGURES))
 
 
+@pytest.mark.long
 def test_what_is_committed_of_a_comparison_comes_out_the_same_every_time(
     tmp_path, monkeypatch, capsys
 ):

@@ -16,6 +16,7 @@ def test_a_page_is_as_its_recipe_fills_it(name: str) -> None:
     assert load(name)["filled"](page) == page
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["tuning", "bench"])
 def test_every_number_of_a_sentence_that_was_changed_is_put_right(name: str) -> None:
     recipe = load(name)

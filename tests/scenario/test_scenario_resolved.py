@@ -165,7 +165,7 @@ def possible(data: dict[str, Any]) -> Scenario:
 UNHURRIED = (HealthCheck.filter_too_much, HealthCheck.too_slow)
 
 
-@settings(max_examples=8, deadline=None, suppress_health_check=UNHURRIED)
+@settings(max_examples=5, deadline=None, suppress_health_check=UNHURRIED)
 @given(SCENARIOS)
 def test_a_resolved_scenario_reads_back_to_the_same_bits(data):
     scenario = possible(data)

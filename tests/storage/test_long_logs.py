@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import REQUIRED, kinds
+from rotation import one_in
 from scenario_samples import loaded
 from storage_samples import ENVIRONMENT, PYTHON, TEXTS, files, log, recording
 
@@ -127,6 +128,7 @@ def writes_left(path: Path, monkeypatch: pytest.MonkeyPatch, writes: int) -> int
     return opened[0].left
 
 
+@pytest.mark.long
 def test_a_disk_that_is_full_from_any_write_on_is_an_error_in_one_line(tmp_path, monkeypatch):
     path = tmp_path / "log.h5"
     total = 10**9 - writes_left(path, monkeypatch, 10**9)
@@ -187,7 +189,7 @@ FULL = {
 }
 
 
-@pytest.mark.parametrize("case", FULL)
+@pytest.mark.parametrize("case", one_in(3, [*FULL]))
 def test_what_cannot_be_written_is_an_error_in_one_line(tmp_path, case):
     limit, held, says = FULL[case]
     text = scenario(actuator="{kind: ideal}", law="pid", period=0)

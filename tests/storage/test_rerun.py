@@ -168,6 +168,7 @@ def test_runs_made_again_are_compared_in_the_order_of_the_scenario(compared, tmp
     assert "damaged, not as podusv wrote it (runs" in podusv("compare", again).err
 
 
+@pytest.mark.long
 def test_a_run_that_cannot_be_repeated_takes_no_other_with_it(compared, podusv, monkeypatch):
     real = compare.execute
 

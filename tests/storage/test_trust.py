@@ -322,8 +322,15 @@ def begun(*words, cwd, python=sys.executable, path=ROOT):
     )
 
 
-@pytest.mark.parametrize("module", ["podusv_cli", "podusv"])
-@pytest.mark.parametrize("command", ["validate scenario.yaml", "list laws"])
+@pytest.mark.parametrize(
+    ("module", "command"),
+    [
+        ("podusv_cli", "validate scenario.yaml"),
+        ("podusv", "list laws"),
+        pytest.param("podusv_cli", "list laws", marks=pytest.mark.long),
+        pytest.param("podusv", "validate scenario.yaml", marks=pytest.mark.long),
+    ],
+)
 def test_no_module_of_somebody_s_folder_runs_where_podusv_begins_in_it(module, command):
     as_if_installed()
     said = begun("-m", module, *command.split(), cwd="gift")
@@ -336,6 +343,7 @@ def test_no_module_of_somebody_s_folder_runs_where_podusv_begins_in_it(module, c
         assert "evil" in one_line(said.stderr)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("place", ["gift", "gift/evil-1.0.dist-info"])
 def test_a_notebook_in_somebody_s_folder_takes_nothing_there_for_installed(place):
     as_if_installed()

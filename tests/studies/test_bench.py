@@ -280,6 +280,7 @@ def test_the_command_writes_table_board_and_page_and_takes_a_law_of_one_s_own(be
     assert "--force replaces it" in again.err
 
 
+@pytest.mark.long
 def test_a_law_that_ends_its_process_costs_no_other(bench, podusv):
     # Plain Python may end its process; compiled code has no way to.
     line = "        signals[0] = target[1] - x[1]\n"
@@ -367,6 +368,7 @@ def test_cases_that_differ_in_what_laws_know_share_an_optimum_and_pods_have_none
     assert any("loads that depend on time alone" in text for text in refused)
 
 
+@pytest.mark.long
 def test_the_command_finds_optima(bench, podusv):
     pytest.importorskip("casadi", reason="the optimum needs CasADi")
     pod = "extends: calm.yaml\nactuator: {kind: pod, preset: cybership2_pod}\n"

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from conftest import example, failure_of, kinds, needed_by
 from counting import counted
+from rotation import one_in
 from scenario_samples import loaded
 from scipy.stats import qmc
 
@@ -276,7 +277,9 @@ CASES = [(folder, kind) for folder in AROUND for kind in kinds(folder).values()]
 
 
 @pytest.mark.parametrize("times", [True, pytest.param(False, marks=pytest.mark.slow)])
-@pytest.mark.parametrize(("folder", "kind"), CASES, ids=lambda one: getattr(one, "__name__", one))
+@pytest.mark.parametrize(
+    ("folder", "kind"), one_in(3, CASES), ids=lambda one: getattr(one, "__name__", one)
+)
 def test_a_draw_is_refused_where_loading_the_scenario_with_it_is(folder, kind, times):
     given = with_kind(folder, kind)
     for key, number in asked(given, AROUND[folder], times=times):

@@ -84,6 +84,7 @@ def test_runs_of_other_kernels_are_not_added_to(whole, updated):
         sweep.run(whole, sweep.Request(figures=False), lambda tally: None)
 
 
+@pytest.mark.long
 def test_shards_of_other_kernels_are_named_and_not_missing(tmp_path, updated):
     one = placed(made(tmp_path / "one", part=(1, 2)))
     updated()
@@ -93,6 +94,7 @@ def test_shards_of_other_kernels_are_named_and_not_missing(tmp_path, updated):
     assert not (tmp_path / "all").exists()
 
 
+@pytest.mark.long
 def test_shards_that_agree_are_joined_with_the_kernels_that_they_have(tmp_path, updated):
     shards = [placed(made(tmp_path / f"{n}", part=(n, 2), draws=8), 8) for n in (1, 2)]
     made(tmp_path / "one", draws=8)
@@ -101,6 +103,7 @@ def test_shards_that_agree_are_joined_with_the_kernels_that_they_have(tmp_path, 
     assert (tmp_path / "all" / RUNS).read_bytes() == (tmp_path / "one" / RUNS).read_bytes()
 
 
+@pytest.mark.long
 def test_force_begins_a_study_anew_and_spares_what_is_no_study(whole, tmp_path):
     folder, config = tmp_path / "study", tmp_path / "small.yaml"
     config.write_text(TEXT)
@@ -182,6 +185,7 @@ def test_invalid_runs_are_told_before_the_first_run(tmp_path):
     assert there == 0
 
 
+@pytest.mark.long
 def test_laws_of_a_study_may_have_different_metrics(tmp_path):
     """Two trials and a law; a log is kept of each, and compared with the table."""
     text = """

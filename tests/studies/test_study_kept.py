@@ -114,6 +114,7 @@ def test_continuing_keeps_what_is_kept(study, tmp_path):
     assert grown.missing == ()
 
 
+@pytest.mark.long
 def test_a_kept_run_that_cannot_be_made_costs_nothing_else(study, tmp_path):
     folder = tmp_path / "blocked"
     shutil.copytree(study.folder, folder)

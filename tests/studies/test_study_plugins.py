@@ -79,6 +79,7 @@ def test_no_metric_has_the_name_of_another_column(config, name):
         swept(config, config.parent / "study")
 
 
+@pytest.mark.long
 def test_a_worker_needs_no_file_of_a_plugin(config, tmp_path, monkeypatch):
     """It gets the text, and makes the same bits."""
     study = swept(config, tmp_path / "study", overrides=["sweep.draws=8"]).folder

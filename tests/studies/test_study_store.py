@@ -126,6 +126,7 @@ def finishing(monkeypatch, act):
     monkeypatch.setattr(runs_writer, "write", lambda *given: (real(*given), act())[0])
 
 
+@pytest.mark.long
 def test_a_unit_that_comes_while_the_table_is_written_is_kept(whole, tmp_path, monkeypatch):
     store = made(tmp_path / "study", part=(1, 2))
     late = Unit("pid", 0, 20, 4)
@@ -191,6 +192,7 @@ def test_time_over_keeps_what_is_made(tmp_path, monkeypatch):
     assert sum(int(mask.sum()) for mask in store.covered_draws().values()) == tally.made
 
 
+@pytest.mark.long
 def test_a_full_disk_while_the_table_is_filled_keeps_the_units(whole, tmp_path, monkeypatch):
     store, real, wrote = made(tmp_path / "study", part=(1, 9)), runs_writer.write_at, []
     units_there = sorted((store.folder / UNITS).iterdir())

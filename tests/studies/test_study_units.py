@@ -14,6 +14,7 @@ from podusv_cli.studies.making import store as stores
 from podusv_cli.studies.making.store import UNITS, decode_unit, encode_unit, read
 
 
+@pytest.mark.long
 def test_a_whole_study_removes_only_units_that_it_read(tmp_path, monkeypatch):
     made(tmp_path / "study", part=(1, 2), draws=8)
     store = made(tmp_path / "study", part=(2, 2), draws=8)

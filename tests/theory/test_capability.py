@@ -122,7 +122,11 @@ def test_what_does_nothing_to_a_hull_is_held_without_limit():
 
 @pytest.mark.parametrize(
     ("sort", "degrees", "actuator"),
-    [("current", 60.0, PODS), ("force", 40.0, LOST), ("wind", 130.0, {"kind": "saturated_full"})],
+    [
+        pytest.param("current", 60.0, PODS, marks=pytest.mark.long),
+        pytest.param("force", 40.0, LOST, marks=pytest.mark.long),
+        ("wind", 130.0, {"kind": "saturated_full"}),
+    ],
 )
 def test_a_run_holds_just_below_and_drifts_away_just_above(sort, degrees, actuator):
     angle = math.radians(degrees)

@@ -366,6 +366,7 @@ def test_a_law_that_does_not_settle_has_no_margins():
         loop_margins(weak, TimeGrid(0.01, 1000))
 
 
+@pytest.mark.long
 def test_a_law_that_stays_near_and_never_rests_is_told_with_its_distance(monkeypatch):
     """The network never rests with the load held; a plain run says how far off it is meanwhile."""
     monkeypatch.setattr(steady, "MOST_EVALUATIONS", 3000)

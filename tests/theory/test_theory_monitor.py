@@ -122,7 +122,7 @@ FOLDS = [
 def test_rates_of_errors_are_derivatives_along_the_flow(law, options):
     law = law.model_copy(update=options)
     loop = corrected(controller=law, path=Circle(), vessel=VESSELS["cybership2"])
-    for at in situations(law, 12):
+    for at in situations(law, 5):
         rows = moving(loop, law, at.x, at.memory)
         now = rates_replay(Plan(loop, TimeGrid(0.01, 1)), compiled=False)(rows)
         e = error_rates(rows, now, law)

@@ -211,6 +211,7 @@ def test_the_page_is_answered_under_its_own_name_alone(address: tuple[str, str])
     assert asked(host, f"{base}frame", {"Origin": own}) == 200  # and goes on
 
 
+@pytest.mark.long
 def test_the_page_names_no_other_place(address: tuple[str, str]) -> None:
     host, base = address
     connection = HTTPConnection(host, timeout=60)

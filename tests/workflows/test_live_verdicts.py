@@ -213,6 +213,7 @@ def test_no_other_law_is_added(moved: dict[str, Any]) -> None:
     assert "not among the values that this page moves" in refused["text"]
 
 
+@pytest.mark.long
 def test_the_report_is_that_of_compare_and_lies_in_the_results(demo: Live, podusv) -> None:
     moved = {"actuator.surge_limit": 4.1, "simulation.duration": 30.0}
     told = demo.answer("report", {"moved": moved})

@@ -166,6 +166,7 @@ def test_packages_and_versions_that_differ_are_named(
     assert "versions, there -> here: packages.numpy 1.9 -> " in said
 
 
+@pytest.mark.long
 def test_an_installed_package_of_components_comes_with_its_runs(
     tmp_path: Path, podusv: Command
 ) -> None:

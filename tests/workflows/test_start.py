@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from command_samples import ROOT, commanded, one_line
 from hull_ratios import ratios, scatter, table
+from rotation import one_in
 
 import podusv as library
 from podusv_cli.components.vessels.estimated import HOERNER, SCATTER, Hull, estimate_vessel
@@ -131,7 +132,7 @@ def test_the_page_prints_every_ratio():
 # --- the scenario
 
 
-@pytest.mark.parametrize("name", ["catamaran", "one azimuth", "milliampere"])
+@pytest.mark.parametrize("name", one_in(3, ["catamaran", "one azimuth", "milliampere"]))
 def test_the_scenario_runs_as_it_is_and_follows_its_legs(podusv, name):
     check(podusv, name)
 

@@ -89,7 +89,8 @@ def rates_at(plan: Plan, *, compiled: bool = True) -> Callable[..., Vector]:
     """
     layout, vectors = plan.layout._replace(hold_every=0, measured=0), plan.vectors()
     vectors.delay_line[COUNT] = 0.0  # nothing is under way: a demand passes at once
-    run = _rates_runner(plan, compiled)
+    bound = _rates_binder(plan, compiled)
+    usual = bound(vectors, layout)
 
     def at(rows: Vector, given: Vector | None = None) -> Vector:
         """Rates and signals (rows, states + columns) at each of `rows` (rows, 1 + states): t, s.
@@ -97,14 +98,14 @@ def rates_at(plan: Plan, *, compiled: bool = True) -> Callable[..., Vector]:
         `given` (rows, 2), or (rows, 3) with a sway force, are demands that act instead of those of
         the law.
         """
-        out, there, sizes = np.zeros((len(rows), layout.states + layout.columns)), vectors, layout
+        out, run = np.zeros((len(rows), layout.states + layout.columns)), usual
         if given is not None:  # as if they had been on their way to the actuator
             whole = np.zeros((len(rows), DEMAND_SIZE))
             whole[:, : given.shape[1]] = given
             line = np.concatenate([np.zeros(DEMANDS), whole.ravel()])
             line[COUNT] = len(rows)
-            there, sizes = vectors._replace(delay_line=line), layout._replace(by_delay_line=1)
-        run(len(rows), rows.ravel(), out.reshape(-1), there, sizes)
+            run = bound(vectors._replace(delay_line=line), layout._replace(by_delay_line=1))
+        run(len(rows), rows.ravel(), out.reshape(-1))
         return out
 
     return at
@@ -130,24 +131,27 @@ def rates_replay(plan: Plan, *, compiled: bool = True) -> Callable[[Recording], 
     return replay_rates
 
 
-def _rates_runner(plan: Plan, compiled: bool) -> Callable[..., None]:
+def _rates_binder(plan: Plan, compiled: bool) -> Callable[[Vectors, Layout], Callable[..., None]]:
     """`rk4.rates_along` with the functions of this loop given, in plain Python or compiled.
 
-    It takes count, logged rows, out, `Vectors` and `Layout`.
+    Bound to `Vectors` and `Layout`, it takes count, logged rows and out.
     """
     if not compiled:
-        bound = [signatures.bind(*part) for part in plan.functions]
-        return lambda *rest: rk4.rates_along(*bound, *rest)
+        parts = [signatures.bind(*part) for part in plan.functions]
+        return lambda *sizes: lambda *rows: rk4.rates_along(*parts, *rows, *sizes)
     from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
 
     adapters = [compile.entry(*part) for part in plan.functions]
     run = compile.routine(compile.Piece(rk4.rates_along, signatures.RATES_ALONG))
 
-    def compiled_run(
-        count: int, logged: Vector, out: Vector, vectors: Vectors, layout: Layout
-    ) -> None:
-        """Evaluate the loop at `count` logged rows, by machine code; writes `out` (flat)."""
-        vectors, sizes = signatures.pointers(vectors), signatures.whole_numbers(layout)
-        run(*adapters, count, signatures.pointer(logged), signatures.pointer(out), vectors, sizes)
+    def bind(vectors: Vectors, layout: Layout) -> Callable[..., None]:
+        places, sizes = signatures.pointers(vectors), signatures.whole_numbers(layout)
 
-    return compiled_run
+        def compiled_run(count: int, logged: Vector, out: Vector) -> None:
+            """Evaluate the loop at `count` logged rows, by machine code; writes `out` (flat)."""
+            rows = signatures.pointer(logged), signatures.pointer(out)
+            run(*adapters, count, *rows, places, sizes)
+
+        return compiled_run
+
+    return bind

@@ -165,7 +165,7 @@ LAYOUTS = {
 }
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(
     layout=st.sampled_from(sorted(LAYOUTS)),
     surge=unit,

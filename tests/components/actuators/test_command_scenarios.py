@@ -87,8 +87,13 @@ def told_gains(law: Controller) -> str:
     ("short", "long", "rest"),
     [
         (0.02, 0.03, PID),
-        (0.0015, 0.003, ("simulation.step=0.0005", "simulation.duration=4")),
-        (0.12, 0.2, (told_gains(SlidingMode()),)),
+        pytest.param(
+            0.0015,
+            0.003,
+            ("simulation.step=0.0005", "simulation.duration=4"),
+            marks=pytest.mark.long,
+        ),
+        pytest.param(0.12, 0.2, (told_gains(SlidingMode()),), marks=pytest.mark.long),
         (0.6, 0.9, (told_gains(VelocityVector()), *CALM)),
         (0.4, 0.7, (told_gains(MomentumVector()), "vessel.preset=cybership2", *CALM)),
     ],

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog, minimize
 
@@ -119,6 +119,7 @@ def test_the_allocation_finds_the_most_sway_that_the_preset_has():
 speed, angle = st.floats(-31.0, 31.0), st.floats(-0.27, 0.27)
 
 
+@settings(max_examples=25)
 @given(n=st.tuples(speed, speed, speed), delta=st.tuples(angle, angle))
 def test_what_running_thrusters_make_the_allocation_makes_again(n, delta):
     """Ahead and astern: a propeller astern has no rudder force, and is not allotted one."""
@@ -168,6 +169,7 @@ def test_two_demands_take_rudders_for_pods_that_turn():
     assert own.settled(np.zeros(6), np.array([0.0, 0.2]))[2] == pytest.approx(0.132, abs=5e-4)
 
 
+@pytest.mark.long
 def test_the_four_corners_are_wider_with_the_ship_s_own_thrusters_as_the_page_says():
     page = Path(__file__).parents[3].joinpath("docs/actuators.md").read_text()
     for law, words in (("pid", "grows from {} to {} m"), ("backstepping", "from {} to {} m.")):

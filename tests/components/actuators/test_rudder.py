@@ -146,7 +146,7 @@ def turning(t, s):
 
 
 def test_a_circle_in_open_water_is_that_of_the_equations_by_hand():
-    run = podusv.run(
+    run = podusv.simulate(
         {
             "name": "circle",
             "vessel": HULL,

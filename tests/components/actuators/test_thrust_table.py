@@ -256,16 +256,19 @@ def boat(tmp_path):
 def test_a_constant_command_settles_where_drag_is_the_tables_thrust(boat):
     """By algebra: 2 T(0.5) = -X_u u, 21 N over 77.554 N s/m."""
     (boat.parent / "c.csv").write_text("t,n_part_1,n_part_2\n0,0.5,0.5\n100,0.5,0.5\n")
-    run = podusv.run(boat, {"controller": {"kind": "schedule", "file": str(boat.parent / "c.csv")}})
+    run = podusv.simulate(
+        boat, {"controller": {"kind": "schedule", "file": str(boat.parent / "c.csv")}}
+    )
     assert run["u"][-1] == pytest.approx(21.0 / 77.554, rel=1e-6)
     assert run["thrust"][-1] == pytest.approx([10.5, 10.5])
 
 
+@pytest.mark.long
 def test_a_run_has_the_thrust_of_its_commands_compiled_or_not(boat):
-    run = podusv.run(boat)
+    run = podusv.simulate(boat)
     n, T = run["n_part"], run["thrust"]
     assert np.allclose(T, np.interp(n, *np.array(ROWS).T), rtol=0.0, atol=1e-12)
-    plain = podusv.run(boat, {"simulation.compiled": False})
+    plain = podusv.simulate(boat, {"simulation.compiled": False})
     assert np.array_equal(run["x"], plain["x"])
     assert np.array_equal(n, plain["n_part"])
 

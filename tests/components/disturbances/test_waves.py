@@ -123,6 +123,7 @@ def heights(components, amplitudes):
     return np.array(found)
 
 
+@pytest.mark.long
 def test_heights_of_random_amplitudes_scatter_as_those_of_a_gaussian_sea():
     """Of a Gaussian process var(m0)/m0^2 = 2 pi (integral of S^2)/(T m0^2); Hs has half of it.
 

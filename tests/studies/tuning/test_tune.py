@@ -98,6 +98,7 @@ def test_repeats_differ(done):
     assert [t.gains for t in first[1:]] != [t.gains for t in second[1:]]
 
 
+@pytest.mark.long
 def test_searches_take_the_training_sets_in_turn_and_the_first_set_is_that_of_a_single_one(
     optuna, tmp_path
 ):

@@ -97,6 +97,7 @@ def test_a_cluster_gives_the_bytes_of_this_machine(near, tmp_path):
     assert [worker["runs"] for worker in told["workers"]] == [2 * 40 + fresh]
 
 
+@pytest.mark.long
 def test_a_trial_that_ends_its_worker_fails_and_no_other(near, tmp_path):
     near.deadly_gain = 5.0
     found = on_cluster(tmp_path, "near", *SMALL).results.trials["toy"]

@@ -83,6 +83,7 @@ def test_a_folder_without_its_scenario_says_how_to_go_on(tmp_path, monkeypatch):
         place.check(tmp_path / "out")
 
 
+@pytest.mark.long
 def test_force_begins_a_search_anew_and_spares_what_is_no_search(tmp_path, optuna):
     def run(train, *, force):
         changes = ("tune.budget=8", "tune.batch=2", "tune.repeats=1", f"tune.train={train}")
@@ -113,6 +114,7 @@ def validation(folder, gain):
     return Store(folder / FOLDER, about(made))
 
 
+@pytest.mark.long
 def test_runs_of_other_gains_are_replaced_wherever_that_was_killed(tmp_path):
     earlier, later = validation(tmp_path, 2.0), validation(tmp_path, 3.0)
     earlier.open("now")

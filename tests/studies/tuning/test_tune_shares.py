@@ -5,6 +5,7 @@ import signal
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from podusv_cli.scenario.load import load
 from podusv_cli.studies.counting.runs import Unit, UnitResult
@@ -103,6 +104,7 @@ def test_units_that_wait_are_shared_out_among_the_processes(monkeypatch):
     assert max(by.count(process) for process in set(by)) == 3
 
 
+@pytest.mark.long
 def test_a_unit_that_kills_its_process_takes_no_other_with_it(monkeypatch):
     faked(monkeypatch, bad={4})
     made = {}
