@@ -160,7 +160,7 @@ def test_a_judged_log_s_own_mean_load_goes_on_in_its_free_runs():
     assert still > 3.0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_in_gusts_the_hull_comes_out_as_loads_that_wander_do_not_give_it(tmp_path):
     """By another program: errors in standard deviations, and the sentence that says so."""
     cell = coverage.CoverageSet(5001, 10, "shaft speeds", 0.02, "gusts", "cybership2")

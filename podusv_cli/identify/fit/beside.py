@@ -1,4 +1,4 @@
-"""What the filter follows beside its nine numbers: positions that wander, loads that are smooth.
+"""What the filter follows beside its nine numbers: positions that wander, loads of gusts.
 
 Errors of positions, north and east apart, are first-order Gauss-Markov processes,
 
@@ -16,13 +16,14 @@ filter that expects the first of gusts takes a part of what they do for the hull
 With e = (g, c) and F and P of the filter's own nine numbers, the covariance C between these and e,
 that of e, G, the diagonals D and W of what forgets and of what is new, and K of w_b^2,
 
-    P' = F P + P F^T + E C^T + C E^T + Q,   C' = F C + E G - C D - P E K,
-    G' = W - D G - G D - K E^T C - C^T E K,
+    P' = F P + P F^T + J C^T + C J^T + Q,   C' = F C + J G - C D - P J K,
+    G' = W - D G - G D - K J^T C - C^T J K,
 
-where E is 1 from c to its b, and nothing but c moves b. A position's derivative is h for the nine
+where J is 1 from c to its b, and nothing but c moves b. A position's derivative is h for the nine
 and 1 for its own g. Sources: A. Gelb (ed.), "Applied Optimal Estimation", MIT Press 1974, ch. 3
-(Markov processes, state augmentation), table 6.1-1; the second-order process is that of the linear
-wave model, T. I. Fossen, "Handbook of Marine Craft Hydrodynamics and Motion Control", 2011, 8.2.6.
+(Markov processes, state augmentation), table 6.1-1; the second-order process has the poles of the
+linear wave model, T. I. Fossen, "Handbook of Marine Craft Hydrodynamics and Motion Control", 2011,
+8.2.6, and no zero.
 """
 
 from __future__ import annotations
