@@ -446,6 +446,7 @@ def test_only_what_is_asked_for_is_drawn_and_what_cannot_be_is_told(podusv):
     assert len(figures_of_report("x")) == 1
 
 
+@pytest.mark.long
 def test_the_report_has_the_figures_as_they_are_written_and_runs_have_none(podusv):
     config = write("two.yaml", FIGURED)
     said = podusv(config, "--out", "x", "--figures")

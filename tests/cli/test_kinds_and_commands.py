@@ -184,13 +184,13 @@ ALSO = {("plug-in", "export")}  # the one export that is not slow
 
 
 def cells() -> list[Any]:
-    """Every kind with every command; one cell in three is not long, in every row and column."""
+    """Every kind with every command; one cell in four is not long, in every row and column."""
     return [
         pytest.param(
             kind,
             command,
             marks=[pytest.mark.slow] * ((kind, command) in SLOW)
-            + [pytest.mark.long] * ((row + column) % 3 != 0 and (kind, command) not in ALSO),
+            + [pytest.mark.long] * ((row + column) % 4 != 0 and (kind, command) not in ALSO),
         )
         for row, kind in enumerate(KINDS)
         for column, command in enumerate(COMMANDS)

@@ -220,6 +220,7 @@ def podusv(place: Path, *words: str, code: int = 0) -> str:
     return done.stdout + done.stderr
 
 
+@pytest.mark.long
 def test_a_comparison_has_its_law_path_vessel_metric_and_figure(place):
     rows = (place / "c/comparison.csv").read_text().splitlines()
     assert any(row.startswith("largest_east,m,") for row in rows)
@@ -259,6 +260,7 @@ def test_its_command_is_one_of_podusvs(place):
     assert "No such command 'wides'" in podusv(place, "wides", code=2)
 
 
+@pytest.mark.long
 def test_a_bug_in_a_package_s_command_is_one_of_the_package(place):
     command = place / "site/my_lab/widest.py"
     text = command.read_text()

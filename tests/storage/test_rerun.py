@@ -156,6 +156,7 @@ def test_every_run_of_a_comparison_is_repeated(compared, tmp_path, podusv):
     manifest.check(tmp_path / "kept")
 
 
+@pytest.mark.long
 def test_runs_made_again_are_compared_in_the_order_of_the_scenario(compared, tmp_path, podusv):
     again, twice = tmp_path / "again", tmp_path / "twice"
     podusv("rerun", compared, "--out", again)

@@ -191,6 +191,7 @@ def asked(host: str, path: str, headers: Mapping[str, str], body: str = QUESTION
     return connection.getresponse().status
 
 
+@pytest.mark.long
 def test_the_page_is_answered_under_its_own_name_alone(address: tuple[str, str]) -> None:
     host, base = address
     assert host.startswith("127.0.0.1:")
