@@ -18,7 +18,7 @@ from podusv_cli.identify import judge
 from podusv_cli.identify.fit import gusts
 from podusv_cli.identify.fit.beside import AXES, CROSS, PLAIN, SIZE, entry, follow
 from podusv_cli.identify.fit.estimate import HullEstimate, estimate_hull
-from podusv_cli.identify.fit.gusts import estimate_in_sea, same_numbers
+from podusv_cli.identify.fit.gusts import SeaSearch, estimate_in_sea
 from podusv_cli.identify.fit.march import GUSTS, NAMES
 from podusv_cli.identify.fit.problem import FIRST_LOADS, MEAN_LOADS
 from podusv_cli.identify.fit.records import log_of
@@ -82,38 +82,57 @@ def test_which_sea_is_kept(log, monkeypatch):
     """Gusts alone that gain enough, at first and beside loads that wander with their own hull."""
     given = problem([log], free=("m33",))
     size = len(given.numbers)
-    made: dict[bool, list[float]] = {}
+    made: dict[bool, list[HullEstimate]] = {}
 
-    def estimate(search, tell, *, starts=5, begun=None):
-        """The next value of this sea's."""
-        value = made[search.size > size].pop(0)
-        return begun or HullEstimate(np.zeros(search.size), value, np.eye(2), 3, True)
+    def estimate(search, tell, *, starts=5, begun=()):
+        """The next one of this sea."""
+        return made[search.size > size].pop(0)
+
+    def of(value, *, gusts=False, settled=False):
+        return HullEstimate(np.zeros(size + 2 * gusts), value, np.eye(2), 3, settled)
 
     monkeypatch.setattr(gusts, "estimate_hull", estimate)
 
-    def kept(first, trial, *others, **values):
-        made[False], made[True] = [first, *others], [*values.get("gusty", ())]
-        tried = HullEstimate(np.zeros(size + 2), trial, np.eye(2), 3)
-        monkeypatch.setattr(gusts, "fit_gusts", lambda *_: tried)
+    def kept(trial, *wandering, swinging=()):
+        made[False], made[True] = [*wandering], [of(v, gusts=True) for v in swinging]
+        monkeypatch.setattr(SeaSearch, "fit_gusts", lambda *_: of(trial, gusts=True))
         sought, found = estimate_in_sea(given, lambda *_: None)
         assert not made[False]
         assert not made[True]  # as many searches as are meant
         return sought.gusts, found.value
 
-    for trial in (100.0, 90.5, math.inf):
-        assert kept(100.0, trial, 100.0) == (False, 100.0)
-    assert kept(100.0, 89.0, 70.0, gusty=[50.0]) == (True, 50.0)
-    assert kept(100.0, 89.0, 59.0, 100.0, gusty=[50.0]) == (False, 100.0)
+    for trial in (100.0, 90.5, math.inf):  # too little, and loads that wander settle
+        assert kept(trial, of(100.0), of(99.0, settled=True)) == (False, 99.0)
+    assert kept(89.0, of(100.0), of(70.0), swinging=[50.0]) == (True, 50.0)
+    assert kept(89.0, of(100.0), of(59.0), of(58.0), swinging=[50.0]) == (False, 58.0)
+    # Loads that wander do not settle, and gusts are tried all the same.
+    assert kept(math.inf, of(100.0), of(90.0), of(95.0), swinging=[79.0]) == (True, 79.0)
+    assert kept(99.0, of(100.0), of(90.0), of(70.0), of(69.5), swinging=[79.0]) == (False, 69.5)
+
+
+def test_searches_that_were_made_before_count_with_those_to_come(log):
+    """Two that have come to the same are enough, and no other begins."""
+    given = problem([log], free=("m33",))
+    once = estimate_hull(given.search, starts=1)
+    whole = estimate_hull(given.search)
+    again = estimate_hull(given.search, begun=(once,))
+    assert (again.value, again.settled) == (whole.value, whole.settled)
+    assert again.y == pytest.approx(whole.y, abs=0.0)
+    far = replace(once, value=once.value + 100.0)
+    assert estimate_hull(given.search, begun=(once, far), starts=2).settled is False
+    calls = []
+    assert estimate_hull(given.search, lambda *_: calls.append(1), begun=(once, once)).settled
+    assert not calls
 
 
 def test_the_prior_of_loads_says_for_no_sea(log):
     """Only what loads do to the logs and to all other numbers counts."""
     given = problem([log], free=("m33",))
-    gusty = replace(given, gusts=True)
-    y, z = np.full(len(given.numbers), 2.0), np.full(len(gusty.numbers), 1.0)
+    sought = SeaSearch(given, lambda *_: None)
+    y, z = np.full(len(given.numbers), 2.0), np.full(len(sought.gusty.numbers), 1.0)
     wanders, swings = (HullEstimate(e, float(e @ e), np.eye(2), 3) for e in (y, z))
     # q_b and q_b_psi beside 4 x (n - 2) of all others; with w_b and z_b beside (n - 2) of them.
-    assert gusts.gain(gusty, swings, given, wanders) == pytest.approx(3.0 * (len(y) - 2))
+    assert sought.gain(swings, wanders) == pytest.approx(3.0 * (len(y) - 2))
 
 
 def test_an_interrupt_while_gusts_are_tried_leaves_the_hull_before(log, monkeypatch):
@@ -122,7 +141,7 @@ def test_an_interrupt_while_gusts_are_tried_leaves_the_hull_before(log, monkeypa
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(gusts, "fit_gusts", interrupted)
+    monkeypatch.setattr(SeaSearch, "fit_gusts", interrupted)
     sought, found = estimate_in_sea(given, lambda *_: None)
     alone = estimate_hull(given.search, starts=1)
     assert (sought.gusts, found.interrupted) == (False, True)
@@ -131,17 +150,16 @@ def test_an_interrupt_while_gusts_are_tried_leaves_the_hull_before(log, monkeypa
 
 def test_gusts_begin_with_the_numbers_of_loads_that_wander(log):
     """A mean load with the one that the log began with; what is new at its prior; and back."""
-    given = problem([log], free=("m33",))
-    gusty = replace(given, gusts=True)
-    y = np.arange(1.0, 1.0 + len(given.numbers))
-    there = same_numbers(given, gusty, y)
-    start = dict(zip((n.name for n in gusty.numbers), there.tolist(), strict=True))
-    known = dict(zip((n.name for n in given.numbers), y.tolist(), strict=True))
+    sought = SeaSearch(problem([log], free=("m33",)), lambda *_: None)
+    y = np.arange(1.0, 1.0 + len(sought.problem.numbers))
+    there = sought.to_gusts(y)
+    start = dict(zip((n.name for n in sought.gusty.numbers), there.tolist(), strict=True))
+    known = dict(zip((n.name for n in sought.problem.numbers), y.tolist(), strict=True))
     for mean, first in zip(MEAN_LOADS, FIRST_LOADS, strict=True):
         assert start.pop(f"{mean}, a.csv") == known.pop(f"{first}, a.csv")
     assert [start.pop(name) for name in GUSTS] == [0.0, 0.0]
     assert start == known
-    assert same_numbers(gusty, given, there) == pytest.approx(y, abs=0.0)
+    assert sought.from_gusts(there) == pytest.approx(y, abs=0.0)
 
 
 def test_a_judged_log_s_own_mean_load_goes_on_in_its_free_runs():

@@ -144,16 +144,17 @@ def estimate_hull(
     tell: Tell = lambda i, value: None,
     *,
     starts: int = STARTS,
-    begun: HullEstimate | None = None,
+    begun: Sequence[HullEstimate] = (),
 ) -> HullEstimate:
     """The best of several searches: from the prior's centre or `first`, `second`, then elsewhere.
 
     The others begin near the better start. They end when two have come to the same value. `begun`
-    is the first search where that was made before. An interrupt leaves the best so far. Raises
+    are the first ones where they were made before. An interrupt leaves the best so far. Raises
     UsageError where the filter breaks down at the first start.
     """
-    starts_at = [np.zeros(search.size) if search.first is None else search.first]
-    found = [begun or _search_from(search, starts_at[0], tell)]
+    first = np.zeros(search.size) if search.first is None else search.first
+    found = [*begun] or [_search_from(search, first, tell)]
+    starts_at = [first, *(e.y for e in found[1:])]
     if not math.isfinite(found[0].value):
         raise UsageError(f"with the vessel as it is given {BREAKS}")
     rng = np.random.Generator(np.random.PCG64(search.size))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.identify.fit.estimate import HullEstimate, HullSearch, Tell, estimate_hull
+from podusv_cli.identify.fit.estimate import STARTS, HullEstimate, HullSearch, Tell, estimate_hull
 from podusv_cli.identify.fit.march import GUSTS
 from podusv_cli.identify.fit.problem import FIRST_LOADS, MEAN_LOADS, WALKS, FitProblem
 
@@ -24,80 +25,114 @@ def estimate_in_sea(problem: FitProblem, tell: Tell) -> tuple[FitProblem, HullEs
 
     An interrupt leaves the best so far.
     """
-    first = estimate_hull(problem.search, tell, starts=1)
-    if first.interrupted:
-        return problem, first
-    try:
-        gusty = _estimate_in_gusts(problem, first, tell)
-    except KeyboardInterrupt:
-        return problem, replace(first, interrupted=True)
-    return gusty or (problem, estimate_hull(problem.search, tell, begun=first))
+    return SeaSearch(problem, tell).estimate()
 
 
-def _estimate_in_gusts(
-    problem: FitProblem, first: HullEstimate, tell: Tell
-) -> tuple[FitProblem, HullEstimate] | None:
-    """The best numbers in gusts; None where these are no likelier than loads that wander.
+@dataclass(frozen=True)
+class SeaSearch:
+    """What is looked for, in loads that wander; `gusty` is the same in gusts."""
 
-    Gusts are tried with the hull of the first search. Where their own numbers alone make the logs
-    likelier, all are looked for; and as that search may have ended at a hull that is wrong, which
-    looks like gusts, loads that wander have to be less likely with the hull that comes out, too.
-    """
-    gusty = replace(problem, gusts=True)
-    trial = fit_gusts(gusty, same_numbers(problem, gusty, first.y), tell)
-    if gain(gusty, trial, problem, first) < BETTER:
-        return None
-    found = estimate_hull(replace(gusty.search, first=trial.y), tell)
-    if found.interrupted:
-        return gusty, found
-    calm = replace(problem.search, first=same_numbers(gusty, problem, found.y))
-    wanders = estimate_hull(calm, tell, starts=1)
-    if wanders.interrupted:
-        return gusty, replace(found, interrupted=True)
-    return (gusty, found) if gain(gusty, found, problem, wanders) >= BETTER else None
+    problem: FitProblem
+    tell: Tell
+
+    @cached_property
+    def gusty(self) -> FitProblem:
+        """The problem in gusts."""
+        return replace(self.problem, gusts=True)
+
+    def estimate(self) -> tuple[FitProblem, HullEstimate]:
+        """The best numbers, and in which sea.
+
+        Gusts are looked for where their own numbers alone make the logs likelier, with the hull of
+        the first search; and where searches in loads that wander do not settle, as they may be
+        stuck far from the hull.
+        """
+        search = self.problem.search
+        found = estimate_hull(search, self.tell, starts=1)
+        if found.interrupted:
+            return self.problem, found
+        try:
+            trial = self.fit_gusts(self.to_gusts(found.y))
+            if self.gain(trial, found) >= BETTER:
+                return self._choose(found, trial.y, STARTS)
+            found = estimate_hull(search, self.tell, begun=(found,))
+            if found.settled or found.interrupted:
+                return self.problem, found
+            return self._choose(found, np.zeros(len(self.gusty.numbers)), 2)
+        except KeyboardInterrupt:
+            return self.problem, replace(found, interrupted=True)
+
+    def _choose(
+        self, found: HullEstimate, begin: Vector, starts: int
+    ) -> tuple[FitProblem, HullEstimate]:
+        """The best numbers in gusts, from a point on, or where these are no likelier, without them.
+
+        A hull that is wrong looks like gusts. So loads that wander are tried with the hull of
+        gusts, too, and have to be less likely than these; else so many searches are made in them.
+        """
+        swings = estimate_hull(replace(self.gusty.search, first=begin), self.tell)
+        if swings.interrupted:
+            return self.gusty, swings
+        calm = replace(self.problem.search, first=self.from_gusts(swings.y))
+        wanders = estimate_hull(calm, self.tell, starts=1)
+        if self.gain(swings, min(found, wanders, key=lambda e: e.value)) >= BETTER:
+            return self.gusty, replace(swings, interrupted=wanders.interrupted)
+        begun = (found, wanders)
+        return self.problem, estimate_hull(calm, self.tell, starts=starts, begun=begun)
+
+    def fit_gusts(self, y: Vector) -> HullEstimate:
+        """The likeliest gusts beside the other numbers of a point.
+
+        Its value is infinite where the filter breaks down at the point. An interrupt ends it.
+        """
+        gusty = self.gusty
+        free = np.array([i for i, number in enumerate(gusty.numbers) if number.name in LOADS])
+        held = y.copy()
+        held[free] = 0.0
+
+        def point(part: Vector) -> Vector:
+            whole = held.copy()
+            whole[free] = part
+            return whole
+
+        def innovations(points: Sequence[Vector]) -> tuple[Vector, Vector]:
+            return gusty.innovations([*map(point, points)])
+
+        search = HullSearch(innovations, len(free), gusty.blocks, first=y[free])
+        if not math.isfinite(search.values([y[free]])[0]):
+            return HullEstimate(y, math.inf, np.eye(len(y)), 0)
+        found = estimate_hull(search, self.tell, starts=1)
+        if found.interrupted:
+            raise KeyboardInterrupt
+        return replace(found, y=point(found.y), value=float(found.value + held @ held))
+
+    def gain(self, swings: HullEstimate, wanders: HullEstimate) -> float:
+        """Of gusts, in -2 log of the posterior, but for the prior of the loads."""
+        return _value_without_loads(self.problem, wanders) - _value_without_loads(
+            self.gusty, swings
+        )
+
+    def to_gusts(self, y: Vector) -> Vector:
+        """The point in gusts with the numbers of one in loads that wander."""
+        return _same_numbers(self.problem, self.gusty, y)
+
+    def from_gusts(self, y: Vector) -> Vector:
+        """And back."""
+        return _same_numbers(self.gusty, self.problem, y)
 
 
-def gain(gusty: FitProblem, found: HullEstimate, problem: FitProblem, other: HullEstimate) -> float:
-    """In -2 log of the posterior, but for the prior of the loads: of gusts over another sea."""
-    values = [
-        estimate.value
-        - sum(e * e for e, n in zip(estimate.y, sea.numbers, strict=True) if n.name in LOADS)
-        for sea, estimate in ((gusty, found), (problem, other))
-    ]
-    return float(values[1] - values[0])
-
-
-def same_numbers(problem: FitProblem, other: FitProblem, y: Vector) -> Vector:
-    """A point in the numbers of another sea; what a log began with and its mean load are one."""
-    known = dict(zip((number.name for number in problem.numbers), y.tolist(), strict=True))
-    for log in problem.logs:
+def _same_numbers(one: FitProblem, other: FitProblem, y: Vector) -> Vector:
+    """The point with the same numbers; what a log began with and its mean load are one."""
+    known = dict(zip((number.name for number in one.numbers), y.tolist(), strict=True))
+    for log in one.logs:
         for pair in zip(FIRST_LOADS, MEAN_LOADS, strict=True):
             names = [f"{name}, {log.name}" for name in pair]
             known |= dict.fromkeys(names, next(known[n] for n in names if n in known))
     return np.array([known.get(number.name, 0.0) for number in other.numbers])
 
 
-def fit_gusts(gusty: FitProblem, y: Vector, tell: Tell) -> HullEstimate:
-    """The likeliest gusts beside the other numbers of a point.
-
-    Its value is infinite where the filter breaks down at the point. An interrupt ends it.
-    """
-    free = np.array([i for i, number in enumerate(gusty.numbers) if number.name in LOADS])
-    held = y.copy()
-    held[free] = 0.0
-
-    def point(part: Vector) -> Vector:
-        whole = held.copy()
-        whole[free] = part
-        return whole
-
-    def innovations(points: Sequence[Vector]) -> tuple[Vector, Vector]:
-        return gusty.innovations([*map(point, points)])
-
-    search = HullSearch(innovations, len(free), gusty.blocks, first=y[free])
-    if not math.isfinite(search.values([y[free]])[0]):
-        return HullEstimate(y, math.inf, np.eye(len(y)), 0)
-    found = estimate_hull(search, tell, starts=1)
-    if found.interrupted:
-        raise KeyboardInterrupt
-    return replace(found, y=point(found.y), value=float(found.value + held @ held))
+def _value_without_loads(sea: FitProblem, found: HullEstimate) -> float:
+    """-2 log of the posterior without what the prior of the loads adds to it."""
+    numbers = zip(found.y.tolist(), sea.numbers, strict=True)
+    spent = sum(e * e for e, number in numbers if number.name in LOADS)
+    return float(found.value - spent)
