@@ -93,21 +93,27 @@ def test_which_sea_is_kept(log, monkeypatch):
 
     monkeypatch.setattr(gusts, "estimate_hull", estimate)
 
-    def kept(trial, *wandering, swinging=()):
+    def kept(*wandering, trials, swinging=()):
         made[False], made[True] = [*wandering], [of(v, gusts=True) for v in swinging]
-        monkeypatch.setattr(SeaSearch, "fit_gusts", lambda *_: of(trial, gusts=True))
+        left = [*trials]
+        monkeypatch.setattr(SeaSearch, "fit_gusts", lambda *_: of(left.pop(0), gusts=True))
         sought, found = estimate_in_sea(given, lambda *_: None)
-        assert not made[False]
-        assert not made[True]  # as many searches as are meant
+        assert [left, made[False], made[True]] == [[], [], []]  # as many searches as are meant
         return sought.gusts, found.value
 
     for trial in (100.0, 90.5, math.inf):  # too little, and loads that wander settle
-        assert kept(trial, of(100.0), of(99.0, settled=True)) == (False, 99.0)
-    assert kept(89.0, of(100.0), of(70.0), swinging=[50.0]) == (True, 50.0)
-    assert kept(89.0, of(100.0), of(59.0), of(58.0), swinging=[50.0]) == (False, 58.0)
+        assert kept(of(100.0), of(99.8, settled=True), trials=[trial]) == (False, 99.8)
+    gusts_win = {"trials": [89.0], "swinging": [50.0]}
+    assert kept(of(100.0), of(70.0), **gusts_win) == (True, 50.0)
+    assert kept(of(100.0), of(59.0), of(58.0), **gusts_win) == (False, 58.0)
     # Loads that wander do not settle, and gusts are tried all the same.
-    assert kept(math.inf, of(100.0), of(90.0), of(95.0), swinging=[79.0]) == (True, 79.0)
-    assert kept(99.0, of(100.0), of(90.0), of(70.0), of(69.5), swinging=[79.0]) == (False, 69.5)
+    unsettled = {"trials": [math.inf, 85.0], "swinging": [79.0]}
+    assert kept(of(100.0), of(90.0), of(95.0), **unsettled) == (True, 79.0)
+    assert kept(of(100.0), of(90.0), of(70.0), of(69.5), **unsettled) == (False, 69.5)
+    # The first search was stuck where gusts gain nothing.
+    stuck = of(100.0), of(60.0, settled=True)
+    assert kept(*stuck, trials=[math.inf, 55.0]) == (False, 60.0)
+    assert kept(*stuck, of(58.0), trials=[99.0, 45.0], swinging=[40.0]) == (True, 40.0)
 
 
 def test_searches_that_were_made_before_count_with_those_to_come(log):

@@ -10,7 +10,14 @@ from functools import cached_property
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.identify.fit.estimate import STARTS, HullEstimate, HullSearch, Tell, estimate_hull
+from podusv_cli.identify.fit.estimate import (
+    SETTLED,
+    STARTS,
+    HullEstimate,
+    HullSearch,
+    Tell,
+    estimate_hull,
+)
 from podusv_cli.identify.fit.march import GUSTS
 from podusv_cli.identify.fit.problem import FIRST_LOADS, MEAN_LOADS, WALKS, FitProblem
 
@@ -44,26 +51,31 @@ class SeaSearch:
         """The best numbers, and in which sea.
 
         Gusts are looked for where their own numbers alone make the logs likelier, with the hull of
-        the first search; and where searches in loads that wander do not settle, as they may be
-        stuck far from the hull.
+        the first search, or of the best if the first was stuck; and where searches in loads that
+        wander do not settle.
         """
         search = self.problem.search
-        found = estimate_hull(search, self.tell, starts=1)
-        if found.interrupted:
-            return self.problem, found
+        found = first = estimate_hull(search, self.tell, starts=1)
         try:
-            trial = self.fit_gusts(self.to_gusts(found.y))
-            if self.gain(trial, found) >= BETTER:
-                return self._choose(found, trial.y, STARTS)
-            found = estimate_hull(search, self.tell, begun=(found,))
-            if found.settled or found.interrupted:
+            begin, starts = self._begin(first), STARTS
+            if begin is None:
+                found, starts = estimate_hull(search, self.tell, begun=(first,)), 2
+                begin = self._begin(found) if found.value < first.value - SETTLED else None
+            if found.interrupted or (begin is None and found.settled):
                 return self.problem, found
-            return self._choose(found, np.zeros(len(self.gusty.numbers)), 2)
+            return self._choose(found, begin, starts)
         except KeyboardInterrupt:
             return self.problem, replace(found, interrupted=True)
 
+    def _begin(self, found: HullEstimate) -> Vector | None:
+        """Where a search in gusts begins: at the likeliest for a hull. None if they gain little."""
+        if found.interrupted:
+            return None
+        trial = self.fit_gusts(self.to_gusts(found.y))
+        return trial.y if self.gain(trial, found) >= BETTER else None
+
     def _choose(
-        self, found: HullEstimate, begin: Vector, starts: int
+        self, found: HullEstimate, begin: Vector | None, starts: int
     ) -> tuple[FitProblem, HullEstimate]:
         """The best numbers in gusts, from a point on, or where these are no likelier, without them.
 
