@@ -21,10 +21,7 @@ ACCELERATION = (
     "the motion has accelerations that neither hull nor load explains, as where the commands are "
     "not what the actuator did"
 )
-LOAD = (
-    "the filter puts the motion on loads that wander, as where positions wander, thrust is wrong "
-    "or it blows"
-)
+LOAD = "the filter puts the motion on loads, as where positions wander, thrust is wrong or it blows"
 # What a noise or a walk that is far larger than was known before says.
 MEANINGS = {
     "sigma": SENSOR,

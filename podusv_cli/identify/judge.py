@@ -116,7 +116,7 @@ def _free_run(problem: FitProblem, log: FilterLog, y: Vector, first: int) -> Fre
 
 
 def _estimate_sea(problem: FitProblem, log: FilterLog, y: Vector) -> list[float]:
-    """The sea that a hull meets along a log, as far as the log determines it.
+    """The sea that a hull meets along a log: a mean load, the current as far as it is determined.
 
     On a straight track a current along it is the same as a load, and is left to that. An
     interrupt ends it.
@@ -133,9 +133,10 @@ def _estimate_sea(problem: FitProblem, log: FilterLog, y: Vector) -> list[float]
     found = estimate_hull(HullSearch(innovations, len(sizes), blocks), starts=1)
     if found.interrupted:
         raise KeyboardInterrupt
-    ways = directions(found.covariance, len(sizes))
+    ways = directions(found.covariance, 2)
     determined = ways.basis[:, : ways.determined_count]
-    return list(sizes * (determined @ (determined.T @ found.y)))
+    current = determined @ (determined.T @ found.y[:2])
+    return list(sizes * np.append(current, found.y[2:]))
 
 
 def _turning(times: Vector, state: Vector) -> Vector:

@@ -66,18 +66,19 @@ def _sensors(answer: Identification) -> list[str]:
         degrees = _with_ends(compass, "deg", math.degrees(1.0))
         lines.append(f"The compass shows {degrees} more than the heading.")
     if problem.gusts:
+        k = problem.values(answer.estimate.y)
+        force, moment = (k[q] / (2.0 * math.sqrt(k[SWINGS] * k[RATE])) for q in ("q_b", "q_b_psi"))
         lines.append(
-            "Gusts explain the logs better than loads that wander: loads swing about a mean at "
-            f"{_with_ends(found[RATE], 'rad/s')}, with the damping ratio "
-            f"{_with_ends(found[SWINGS], '')}."
+            "Loads of gusts explain the logs better than loads that wander: about the means of the "
+            f"logs they have an rms of {force:.2g} N north and east and {moment:.2g} N m, at rates "
+            f"up to about {_with_ends(found[RATE], 'rad/s')}."
         )
     return lines
 
 
 def _with_ends(p: Parameter, unit: str, factor: float = 1.0) -> str:
     """A number with its interval, times a factor that makes its unit this one."""
-    value = f"{factor * p.value:.2g} {unit}".rstrip()
-    return f"{value} ({factor * p.low:.2g} to {factor * p.high:.2g})"
+    return f"{factor * p.value:.2g} {unit} ({factor * p.low:.2g} to {factor * p.high:.2g})"
 
 
 def _judge_in_words(answer: Identification) -> list[str]:

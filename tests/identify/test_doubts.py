@@ -138,8 +138,8 @@ def answer_at(logs, off, *, settled=True):
 @pytest.mark.parametrize(
     ("name", "meaning"),
     [
-        ("q_b", "loads that wander"),
-        ("q_b_psi", "loads that wander"),
+        ("q_b", "the motion on loads"),
+        ("q_b_psi", "the motion on loads"),
         ("q_u", "accelerations that neither hull nor load explains"),
         ("sigma_p", "the sensor is off by more"),
         ("sigma_r", "the sensor is off by more"),

@@ -137,6 +137,7 @@ class HullEstimate:
     rounds: int
     settled: bool = False  # whether two searches have come to it
     interrupted: bool = False
+    start: Vector | None = None  # of the search that came to it
 
 
 def estimate_hull(
@@ -154,7 +155,7 @@ def estimate_hull(
     """
     first = np.zeros(search.size) if search.first is None else search.first
     found = [*begun] or [_search_from(search, first, tell)]
-    starts_at = [first, *(e.y for e in found[1:])]
+    starts_at = [first if e.start is None else e.start for e in found]
     if not math.isfinite(found[0].value):
         raise UsageError(f"with the vessel as it is given {BREAKS}")
     rng = np.random.Generator(np.random.PCG64(search.size))
@@ -169,7 +170,8 @@ def estimate_hull(
         except KeyboardInterrupt:  # before its first round
             found[-1] = replace(found[-1], interrupted=True)
     least = min(found, key=lambda e: e.value)
-    return replace(least, settled=_agree(found), interrupted=found[-1].interrupted)
+    settled = _agree(found) or least.settled
+    return replace(least, settled=settled, interrupted=found[-1].interrupted)
 
 
 def _agree(found: Sequence[HullEstimate]) -> bool:
@@ -180,7 +182,7 @@ def _agree(found: Sequence[HullEstimate]) -> bool:
 
 def _search_from(search: HullSearch, y: Vector, tell: Tell) -> HullEstimate:
     """Fisher scoring, damped as Marquardt does; each round tries eight dampings side by side."""
-    i, stopped, at = 0, False, search.score(y)
+    i, stopped, at, start = 0, False, search.score(y), y
     try:
         for i in range(1, ROUNDS + 1):
             tell(i, at.value)
@@ -193,7 +195,8 @@ def _search_from(search: HullSearch, y: Vector, tell: Tell) -> HullEstimate:
     except KeyboardInterrupt:
         stopped = True
     with np.errstate(all="ignore"):  # of a start at which the filter breaks down
-        return HullEstimate(y, at.value, covariance(at, search.hull), i, interrupted=stopped)
+        spread = covariance(at, search.hull)
+    return HullEstimate(y, at.value, spread, i, interrupted=stopped, start=start)
 
 
 def _steps(at: Scored, y: Vector, hull: int) -> tuple[list[Vector], float]:
