@@ -82,12 +82,16 @@ def pairs(made: pd.DataFrame) -> pd.DataFrame:
 
 
 def paragraph(made: pd.DataFrame) -> str:
-    """The pooled numbers, those without the sea that is worst, and the lowest cells."""
+    """The pooled numbers, those without gusts, where gusts were found, and the lowest cells."""
     pooled, calmer = count_held(made), count_held(made[made.sea != "gusts"])
+    gusty, found = made[made.sea == "gusts"], made[made.gusts.eq(True)]
     return (
         f"Of the {pooled['determined']} numbers and forces that count as determined "
         f"{pooled['held']:.1f} % lie in their intervals, with an rms of {pooled['rms']:.2f}; "
-        f"in the {calmer['sets']} sets without gusts {calmer['held']:.1f} %, {calmer['rms']:.2f}."
+        f"in the {calmer['sets']} sets without gusts {calmer['held']:.1f} %, {calmer['rms']:.2f}. "
+        f"Loads were taken for gusts in {found[found.sea == 'gusts'].number.nunique()} of the "
+        f"{gusty.number.nunique()} sets with gusts, and in "
+        f"{found[found.sea != 'gusts'].number.nunique()} others."
         f"{_lowest_pairs(pairs(made))}"
     )
 
