@@ -33,6 +33,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.identify.answer import SIDE, Identification
 from podusv_cli.identify.fit.estimate import OPEN
 from podusv_cli.identify.fit.numbers import hull_numbers
+from podusv_cli.identify.fit.records import FilterLog
 from podusv_cli.identify.intake import logs_of
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.model import Scenario
@@ -173,6 +174,17 @@ def write_logs(
         yield path
 
 
+def read_logs(
+    folder: Path, boat: plain_logs.PlainBoat, cell: CoverageSet, before: Scenario
+) -> list[FilterLog]:
+    """The logs of a boat, written into a folder, as the filter takes them."""
+    return [
+        log
+        for path in write_logs(folder, boat, cell, before)
+        for log in logs_of(path, LogFile(file=path.name, delay=0.0), before)
+    ]
+
+
 def speeds_and_angles(
     boat: plain_logs.PlainBoat, share: float, rng: np.random.Generator
 ) -> Callable[[float], Sequence[float]]:
@@ -199,11 +211,7 @@ def make_set(number: int) -> list[dict[str, Any]]:
     boat = true_boat(before, cell, np.random.default_rng([cell.number, 99]))
     try:
         with TemporaryDirectory() as folder:
-            given = [
-                (log, "fit")
-                for path in write_logs(Path(folder), boat, cell, before)
-                for log in logs_of(path, LogFile(file=path.name, delay=0.0), before)
-            ]
+            given = [(log, "fit") for log in read_logs(Path(folder), boat, cell, before)]
         answer = answer_logs(before, WANTED, given, None)
         lines = [*numbers_beside_truth(answer, boat), *forces_beside_truth(answer, boat)]
     except (UsageError, ValidationError, np.linalg.LinAlgError) as error:

@@ -69,7 +69,9 @@ def free_run(run: FreeRun) -> Figure:
             color=colour,
             label=escaping.figure(who),
         )
-        heading.plot(since, np.degrees(pose[:, 2]), color=colour)
+        # The filter counts turns since the log began, what was measured since the run did.
+        turns = np.round((psi[0] - pose[seen, 2][0]) / (2.0 * np.pi))
+        heading.plot(since, np.degrees(pose[:, 2] + 2.0 * np.pi * turns), color=colour)
     middle, side = np.degrees(np.median(psi)), np.degrees(np.ptp(psi))
     heading.set_ylim(middle - side - 10.0, middle + side + 10.0)
     track.set(xlabel="east [m]", ylabel="north [m]")

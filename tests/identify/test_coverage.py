@@ -15,8 +15,6 @@ from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import bundle, call
 from podusv_cli.identify.fit.estimate import estimate_hull
 from podusv_cli.identify.fit.problem import FitProblem
-from podusv_cli.identify.intake import logs_of
-from podusv_cli.scenario.identify import LogFile
 
 HULLS = coverage.FACTORS["hull"]
 
@@ -107,11 +105,7 @@ def test_a_search_does_not_end_in_steps_of_the_filter_where_sway_changes_its_sig
     cell = coverage.CoverageSet(5000, 10, "commands", 0.02, "wandering", "otter")
     before = coverage.known_before(cell)
     boat = coverage.true_boat(before, cell, np.random.default_rng([cell.number, 99]))
-    given = [
-        log
-        for path in coverage.write_logs(tmp_path, boat, cell, before)
-        for log in logs_of(path, LogFile(file=path.name, delay=0.0), before)
-    ]
+    given = coverage.read_logs(tmp_path, boat, cell, before)
     problem = FitProblem(before, coverage.WANTED, given)
     found = estimate_hull(problem.search, starts=1)
     assert found.rounds < 30

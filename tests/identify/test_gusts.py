@@ -23,9 +23,7 @@ from podusv_cli.identify.fit.gusts import SeaSearch, estimate_in_sea
 from podusv_cli.identify.fit.march import GUSTS, NAMES
 from podusv_cli.identify.fit.problem import FIRST_LOADS, MEAN_LOADS
 from podusv_cli.identify.fit.records import log_of
-from podusv_cli.identify.intake import logs_of
 from podusv_cli.identify.phrases import summary
-from podusv_cli.scenario.identify import LogFile
 from podusv_cli.workflows.identify import answer_logs
 
 MEANS = dict(zip(MEAN_LOADS, (0.7, -1.1, 0.4), strict=True))
@@ -233,11 +231,7 @@ def test_in_gusts_of_another_program_the_hull_comes_out(tmp_path):
     cell = coverage.CoverageSet(5001, 10, "shaft speeds", 0.02, "gusts", "cybership2")
     before = coverage.known_before(cell)
     boat = coverage.true_boat(before, cell, np.random.default_rng([cell.number, 99]))
-    given = [
-        (log, "fit")
-        for path in coverage.write_logs(tmp_path, boat, cell, before)
-        for log in logs_of(path, LogFile(file=path.name, delay=0.0), before)
-    ]
+    given = [(log, "fit") for log in coverage.read_logs(tmp_path, boat, cell, before)]
     answer = answer_logs(before, coverage.WANTED, given, None)
     assert answer.problem.gusts
     off = {line["name"]: line["off"] for line in coverage.numbers_beside_truth(answer, boat)}

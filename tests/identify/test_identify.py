@@ -32,6 +32,7 @@ from podusv_cli.core.kernel import LANES, bundle
 from podusv_cli.identify import judge
 from podusv_cli.identify.answer import Identification
 from podusv_cli.identify.doubts import early_words, thrust_words, worse_words
+from podusv_cli.identify.figures import free_run
 from podusv_cli.identify.fit.beside import SIZE
 from podusv_cli.identify.fit.estimate import OPEN, SILENT, HullEstimate, directions
 from podusv_cli.identify.fit.march import (
@@ -262,6 +263,21 @@ def test_a_free_run_of_the_true_hull_stays_with_the_boat(boat):
     assert errors[0][0] < 0.3
     weak = np.where(np.array(names) == "m11", 1.0, calm)
     assert judge.free_runs(given, boat[2], weak)[0].errors(30.0)[0][0] > 3.0 * errors[0][0]
+
+
+def test_the_drawn_headings_of_a_free_run_begin_together():
+    """However often the boat has turned before, by the filter's count."""
+    times = np.arange(0.0, 30.0, 0.5)
+    pose = np.column_stack([0.5 * times, 0.1 * times, 0.2 * times - 3.0])
+    measured = pose.copy()
+    measured[:, 2] = (measured[:, 2] + math.pi) % (2.0 * math.pi) - math.pi
+    measured[:2, 2] = np.nan
+    turned = [pose + np.array([0.0, 0.0, 2.0 * math.pi * turns]) for turns in (-1, 0, 3)]
+    _, heading = free_run(judge.FreeRun(times, measured, tuple(turned))).axes[:2]
+    seen, *drawn = (line.get_ydata() for line in heading.lines)
+    for line in drawn:
+        assert line[2] == pytest.approx(seen[0])
+        assert line == pytest.approx(np.degrees(pose[:, 2]))
 
 
 def test_on_a_straight_track_a_current_along_it_is_left_to_the_load(boat):

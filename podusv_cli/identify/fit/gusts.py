@@ -22,8 +22,8 @@ from podusv_cli.identify.fit.estimate import (
 from podusv_cli.identify.fit.march import GUSTS
 from podusv_cli.identify.fit.problem import FIRST_LOADS, MEAN_LOADS, WALKS, FitProblem
 
-# In -2 log of the posterior, but for the prior of the loads: what gusts have to gain. On calm water
-# the model ship's logs gave them 7 to 9 (ten draws), since less of what is there weighs on them.
+# What gusts have to gain, in -2 log of the posterior without the prior of the loads. They gained 7
+# to 9 on ten calm logs of the model ship: that prior still moves the optimum of either sea.
 BETTER = 10.0
 # What makes the loads of a sea. Their prior does not count between seas: on calm water it says that
 # loads are small, and less so of gusts, which would win by that.
@@ -80,10 +80,10 @@ class SeaSearch:
     def _choose(
         self, found: HullEstimate, begin: Vector | None, starts: int
     ) -> tuple[FitProblem, HullEstimate]:
-        """The best numbers in gusts, from a point on, or where these are no likelier, without them.
+        """The best numbers in gusts, looked for from a point on, if they are likelier than `found`.
 
-        A hull that is wrong looks like gusts. So loads that wander are tried with the hull of
-        gusts, too, and have to be less likely than these; else so many searches are made in them.
+        A wrong hull looks like gusts. So loads that wander are tried with the hull of gusts, too,
+        and have to be less likely. Otherwise searches in loads that wander go on, up to `starts`.
         """
         swings = self._look(self.gusty, begin, STARTS)
         if swings is None:
@@ -142,11 +142,11 @@ class SeaSearch:
         )
 
     def to_gusts(self, y: Vector) -> Vector:
-        """The point in gusts with the numbers of one in loads that wander."""
+        """The point in gusts that has the numbers of a point in loads that wander."""
         return _same_numbers(self.problem, self.gusty, y)
 
     def from_gusts(self, y: Vector) -> Vector:
-        """And back."""
+        """The point in loads that wander that has the numbers of a point in gusts."""
         return _same_numbers(self.gusty, self.problem, y)
 
 
