@@ -101,6 +101,12 @@ TABLE: dict[str, list[Row]] = {
      "test_a_log_that_is_mapped_lies_in_no_folder_that_is_renamed"),
 ],
 "identify/logs": [
+    ("(np.arange(len(did)) >= at)", "(np.arange(len(did)) >= 0)",
+     "test_a_log_counts_from_where_lags_forget_what_was_before"),
+    ("np.flatnonzero(unlike)[-1]) + 1", "np.flatnonzero(unlike)[0]) + 1",
+     "test_what_pods_did_is_that_of_another_program"),
+    ("piece for piece in found if _long(piece, 0, len(piece.times))", "piece for piece in found",
+     "test_pieces_that_end_before_lags_forget_are_left_out"),
     (" and not any(line.cells[count:]) for line", " for line",
      "test_a_surplus_cell_with_something_in_it_is_refused"),
     ('c.replace(".", "_").replace(",", ".") for c', 'c.replace(",", ".") for c',

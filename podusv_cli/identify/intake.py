@@ -20,6 +20,7 @@ from podusv_cli.core.signal import STATE
 from podusv_cli.identify.fit.records import FEWEST, POSE, FilterLog, complete, log_of
 from podusv_cli.identify.logs.checks import check_log
 from podusv_cli.identify.logs.commands import with_actuator_state
+from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.motion import BinnedMotion
 from podusv_cli.identify.logs.reading import CLOCK, LogTable, NamedQuantities, tables
 from podusv_cli.identify.offsets import Clocks
@@ -51,7 +52,7 @@ def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[FilterLog]:
         part = replace(boot, warnings=(*boot.warnings, *doubts))
         step = min(step, stable_step(at_rows, scenario.vessel))
         found += [*pieces(part)]
-    found = [with_actuator_state(piece.finer(step), actuator) for piece in found]
+    found = _long_ones([with_actuator_state(piece.finer(step), actuator) for piece in found])
     longest = max(found, key=lambda piece: piece.times[-1] - piece.times[0])
     delay, lines = (
         (given.delay, []) if given.delay is not None else Clocks(scenario, longest).delay()
@@ -141,6 +142,22 @@ def pieces(log: LogTable) -> Iterator[LogTable]:
         name = f"{log.name} from {log.times[a]:.10g} s"
         yield replace(piece, name=name, warnings=warnings)
         warnings = ()
+
+
+def _long_ones(found: Sequence[LogTable]) -> list[LogTable]:
+    """Pieces that are still long enough to follow, the first with the warnings of all.
+
+    Raises LogFault where none is.
+    """
+    kept = [piece for piece in found if _long(piece, 0, len(piece.times))]
+    if not kept:
+        raise LogFault(
+            f"{found[0].name}: its pieces between gaps end before the actuator's lags forget what "
+            "was commanded ahead of them; take a longer part of the log, or name the columns of "
+            "what the actuator did"
+        )
+    warnings = tuple(line for piece in found for line in piece.warnings)
+    return [replace(kept[0], warnings=warnings), *kept[1:]]
 
 
 def _long(log: LogTable, begin: int, end: int) -> bool:

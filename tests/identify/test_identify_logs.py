@@ -18,7 +18,7 @@ from podusv_cli.identify.fit.problem import FitProblem
 from podusv_cli.identify.fit.records import log_of
 from podusv_cli.identify.intake import logs_of, pieces
 from podusv_cli.identify.logs.checks import check_log
-from podusv_cli.identify.logs.commands import hold_values, with_actuator_state
+from podusv_cli.identify.logs.commands import hold_values
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.reading import LogTable
 from podusv_cli.identify.offsets import Clocks
@@ -301,35 +301,6 @@ def test_all_logs_for_judging():
 
 
 # Commands
-
-
-def test_what_pods_did_follows_from_their_commands():
-    """A step goes as 1 - exp(-t / T); an angle turns no faster than its limit."""
-    pods = (
-        "{x: -0.5, T_nn: 0.01, T_nn_astern: 0.01, n_max: 100, n_max_astern: 50, n_rate: 1e6, "
-        "n_lag: 0.5, angle_limit: 1.5, angle_rate: 0.25, angle_lag: 0.1}"
-    )
-    actuator = load(
-        "podusv:trials/base.yaml",
-        [
-            "vessel={preset: cybership2}",
-            "controller={kind: pid}",
-            f"actuator={{kind: pod, pods: [{pods}]}}",
-        ],
-    ).scenario.actuator
-    times = np.arange(0.0, 4.0, 0.1)
-    ordered = {
-        "n_cmd_1": np.where(times < 1.0, 0.0, 10.0),
-        "delta_cmd_1": np.where(times < 1.0, 0.0, 0.5),
-    }
-    log = with_actuator_state(LogTable("a.csv", times, ordered), actuator)
-    after = np.maximum(times - 1.0, 0.0)
-    assert log.columns["n_1"] == pytest.approx(10.0 * (1.0 - np.exp(-after / 0.5)), abs=0.15)
-    turning = (after > 0.0) & (after < 1.8)
-    assert log.columns["delta_1"][turning] == pytest.approx(0.25 * after[turning], abs=1e-9)
-    assert "n_1, delta_1 follow from commands" in log.notes[0]
-    own = replace(log, notes=())
-    assert with_actuator_state(own, actuator) is own
 
 
 @pytest.mark.parametrize(("every", "count"), [(1, 0), (2, 0), (4, 1)])

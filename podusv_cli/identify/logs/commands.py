@@ -11,12 +11,15 @@ from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.identify.logs.reading import LogTable
 
 FINE = 0.2  # of the shortest lag, one step at most
+KNOWN = 0.01  # of the largest value in a log: how well a state has to be known
 
 
 def with_actuator_state(table: LogTable, actuator: Actuator) -> LogTable:
     """The log with what the actuator did at its rows, where it has only the commands of it.
 
-    Lags hang on no motion of the hull. What the log itself has of this stays.
+    Lags hang on no motion of the hull. What the log itself has of this stays. Commands do not say
+    what the actuator did before them: rows go until it is in one state, whether it was at rest
+    before or had followed them.
     """
     names = [signal.name for signal in actuator.replayed]
     commands = dict(zip(names, (signal.name for signal in actuator.lagged), strict=False))
@@ -24,16 +27,27 @@ def with_actuator_state(table: LogTable, actuator: Actuator) -> LogTable:
     if not lacking:
         return table
     still = np.zeros(len(table.times))
-    inputs = [
-        hold_values(table.columns.get(n, table.columns.get(commands.get(n, ""), still)))
-        for n in names
-    ]
-    did = dict(
-        zip(names, _lag_commands(table.times, np.column_stack(inputs), actuator).T, strict=True)
+    inputs = np.column_stack(
+        [
+            hold_values(table.columns.get(n, table.columns.get(commands.get(n, ""), still)))
+            for n in names
+        ]
     )
+    did = _lag_commands(table.times, inputs, actuator, inputs[0])
+    at = _first_known(did, _lag_commands(table.times, inputs, actuator, np.zeros(len(names))))
     note = f"{table.name}: {', '.join(lacking)} follow from commands by the actuator's lags."
-    columns = {**table.columns, **{name: did[name] for name in lacking}}
-    return replace(table, columns=columns, notes=(*table.notes, note))
+    if 0 < at < len(did):
+        note += f" It counts from {table.times[at]:.10g} s on, where they forget what was before."
+    by_name = dict(zip(names, did.T, strict=True))
+    columns = {**table.columns, **{name: by_name[name] for name in lacking}}
+    known = replace(table, columns=columns, notes=(*table.notes, note))
+    return known.where(np.arange(len(did)) >= at)
+
+
+def _first_known(one: Vector, other: Vector) -> int:
+    """The first row from which on two courses of the states are one; behind the last if none is."""
+    unlike = np.any(np.abs(one - other) > KNOWN * np.abs(one).max(axis=0), axis=1)
+    return int(np.flatnonzero(unlike)[-1]) + 1 if unlike.any() else 0
 
 
 def hold_values(values: Vector) -> Vector:
@@ -45,11 +59,11 @@ def hold_values(values: Vector) -> Vector:
     return np.asarray(values[last])
 
 
-def _lag_commands(times: Vector, commands: Vector, actuator: Actuator) -> Vector:
-    """The actuator's state at each time by Heun's method; it begins as it is commanded."""
+def _lag_commands(times: Vector, commands: Vector, actuator: Actuator, begin: Vector) -> Vector:
+    """The actuator's state at each time by Heun's method, from one that it begins with."""
     k, table = bundle(actuator.constants()), actuator.table()
     longest, states = FINE * actuator.shortest_lag(), np.empty_like(commands)
-    states[0] = state = commands[0].copy()
+    states[0] = state = begin
     first, second = np.zeros(len(state)), np.zeros(len(state))
     for row, span in enumerate(np.diff(times)):
         steps = max(1, int(np.ceil(span / longest)))
