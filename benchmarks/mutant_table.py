@@ -101,7 +101,7 @@ TABLE: dict[str, list[Row]] = {
      "test_a_log_that_is_mapped_lies_in_no_folder_that_is_renamed"),
 ],
 "identify/logs": [
-    ("(np.arange(len(did)) >= at)", "(np.arange(len(did)) >= 0)",
+    ("(np.arange(len(rested)) >= at)", "(np.arange(len(rested)) >= 0)",
      "test_a_log_counts_from_where_lags_forget_what_was_before"),
     ("np.flatnonzero(unlike)[-1]) + 1", "np.flatnonzero(unlike)[0]) + 1",
      "test_what_pods_did_is_that_of_another_program"),

@@ -19,7 +19,7 @@ from podusv_cli.core.kernel import bundle
 from podusv_cli.core.signal import STATE
 from podusv_cli.identify.fit.records import FEWEST, POSE, FilterLog, complete, log_of
 from podusv_cli.identify.logs.checks import check_log
-from podusv_cli.identify.logs.commands import with_actuator_state
+from podusv_cli.identify.logs.commands import with_actuator_state, with_known_state
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.motion import BinnedMotion
 from podusv_cli.identify.logs.reading import CLOCK, LogTable, NamedQuantities, tables
@@ -52,7 +52,7 @@ def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[FilterLog]:
         part = replace(boot, warnings=(*boot.warnings, *doubts))
         step = min(step, stable_step(at_rows, scenario.vessel))
         found += [*pieces(part)]
-    found = _long_ones([with_actuator_state(piece.finer(step), actuator) for piece in found])
+    found = _long_ones([with_known_state(piece.finer(step), actuator) for piece in found])
     longest = max(found, key=lambda piece: piece.times[-1] - piece.times[0])
     delay, lines = (
         (given.delay, []) if given.delay is not None else Clocks(scenario, longest).delay()

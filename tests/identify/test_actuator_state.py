@@ -11,7 +11,7 @@ from log_files import written
 from benchmarks import coverage, plain_logs
 from podusv_cli.core.errors import UsageError
 from podusv_cli.identify.intake import logs_of
-from podusv_cli.identify.logs.commands import with_actuator_state
+from podusv_cli.identify.logs.commands import with_actuator_state, with_known_state
 from podusv_cli.identify.logs.reading import LogTable
 from podusv_cli.scenario.identify import LogFile
 from podusv_cli.scenario.load import load
@@ -79,7 +79,7 @@ def test_a_log_counts_from_where_lags_forget_what_was_before(pods):
     """
     times = np.arange(7.0, 12.0, 0.1)
     ordered = {"n_cmd_1": np.full(len(times), 10.0), "delta_cmd_1": np.full(len(times), 0.5)}
-    log = with_actuator_state(LogTable("a.csv", times, ordered), pods)
+    log = with_known_state(LogTable("a.csv", times, ordered), pods)
     assert log.times[0] == pytest.approx(9.4)
     assert log.columns["n_1"] == pytest.approx(10.0, rel=1e-12)
     assert log.notes[0].endswith("It counts from 9.4 s on, where they forget what was before.")
@@ -88,7 +88,7 @@ def test_a_log_counts_from_where_lags_forget_what_was_before(pods):
 @pytest.mark.parametrize("begin", [0.0, 29.4])
 def test_what_pods_did_is_that_of_another_program(sailed, begin):
     """A log from rest, which commands do not say, and one that begins under way."""
-    log = with_actuator_state(commands_from(sailed, begin), BEFORE.actuator)
+    log = with_known_state(commands_from(sailed, begin), BEFORE.actuator)
     late = log.times[0] - begin
     assert 3.0 * np.log(20.0) < late < 3.0 * np.log(500.0)  # of the slower lag
     for name in ("n_part_1", "n_part_3", "delta_2"):

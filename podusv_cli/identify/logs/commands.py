@@ -17,31 +17,47 @@ KNOWN = 0.01  # of the largest value in a log: how well a state has to be known
 def with_actuator_state(table: LogTable, actuator: Actuator) -> LogTable:
     """The log with what the actuator did at its rows, where it has only the commands of it.
 
-    Lags hang on no motion of the hull. What the log itself has of this stays. Commands do not say
-    what the actuator did before them: rows go until it is in one state, whether it was at rest
-    before or had followed them.
+    Lags hang on no motion of the hull. What the log itself has of this stays.
     """
+    names, lacking, inputs = _commanded(table, actuator)
+    if not lacking:
+        return table
+    did = dict(zip(names, _lag_commands(table.times, inputs, actuator, inputs[0]).T, strict=True))
+    note = f"{table.name}: {', '.join(lacking)} follow from commands by the actuator's lags."
+    columns = {**table.columns, **{name: did[name] for name in lacking}}
+    return replace(table, columns=columns, notes=(*table.notes, note))
+
+
+def with_known_state(table: LogTable, actuator: Actuator) -> LogTable:
+    """The same, from where it does not matter what the actuator did before the log began.
+
+    There it is in one state, whether it was at rest before or had followed its commands. A log of
+    commands alone has no rows where that is nowhere.
+    """
+    whole = with_actuator_state(table, actuator)
+    names, lacking, inputs = _commanded(table, actuator)
+    if not lacking:
+        return whole
+    rested = _lag_commands(table.times, inputs, actuator, np.zeros(len(names)))
+    did = np.column_stack([whole.columns[name] for name in lacking])
+    at = _first_known(did, rested[:, [names.index(name) for name in lacking]])
+    if 0 < at < len(rested):
+        since = f"It counts from {table.times[at]:.10g} s on, where they forget what was before."
+        whole = replace(whole, notes=(*whole.notes[:-1], f"{whole.notes[-1]} {since}"))
+    return whole.where(np.arange(len(rested)) >= at)
+
+
+def _commanded(table: LogTable, actuator: Actuator) -> tuple[list[str], list[str], Vector]:
+    """What is `replayed`, what of it the log has commands of alone, and what all of it follows."""
     names = [signal.name for signal in actuator.replayed]
     commands = dict(zip(names, (signal.name for signal in actuator.lagged), strict=False))
     lacking = [n for n in names if n not in table.columns and commands.get(n) in table.columns]
-    if not lacking:
-        return table
     still = np.zeros(len(table.times))
-    inputs = np.column_stack(
-        [
-            hold_values(table.columns.get(n, table.columns.get(commands.get(n, ""), still)))
-            for n in names
-        ]
-    )
-    did = _lag_commands(table.times, inputs, actuator, inputs[0])
-    at = _first_known(did, _lag_commands(table.times, inputs, actuator, np.zeros(len(names))))
-    note = f"{table.name}: {', '.join(lacking)} follow from commands by the actuator's lags."
-    if 0 < at < len(did):
-        note += f" It counts from {table.times[at]:.10g} s on, where they forget what was before."
-    by_name = dict(zip(names, did.T, strict=True))
-    columns = {**table.columns, **{name: by_name[name] for name in lacking}}
-    known = replace(table, columns=columns, notes=(*table.notes, note))
-    return known.where(np.arange(len(did)) >= at)
+    inputs = [
+        hold_values(table.columns.get(n, table.columns.get(commands.get(n, ""), still)))
+        for n in names
+    ]
+    return names, lacking, np.column_stack(inputs) if inputs else np.zeros((len(table.times), 0))
 
 
 def _first_known(one: Vector, other: Vector) -> int:
