@@ -157,6 +157,7 @@ class Facts:
     @cached_property
     def w_N(self) -> float:
         """sqrt(N/m33) [1/s]: how fast the moment turns the hull."""
+        # At one side no moment may be left
         return math.sqrt(max(self.N, 0.0) / self.nominal.m33)
 
     @cached_property
@@ -207,6 +208,7 @@ class Facts:
     @cached_property
     def c(self) -> float:
         """Gain times delay; above 0.3 only where the loop would be slower than the hull."""
+        # 0.3 leaves a yaw loop of two equal gains about 41 deg of phase (docs/laws/gains.md)
         return min(max(0.6 * self.T_r * self.U / self.L, 0.3), 0.6)
 
     @cached_property

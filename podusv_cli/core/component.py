@@ -77,6 +77,7 @@ class Component(BaseModel):
     rules: ClassVar[dict[str, Rule]] = {}
     stands_alone: ClassVar[bool] = False
     noun: ClassVar[str] = "component"
+    # Strict: true is no 1.0 and "1.5" no number. NaN is refused, since no limit would keep it out
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
     @property
@@ -108,6 +109,7 @@ class Component(BaseModel):
             number = rule.of(facts, type(self).model_fields[name].default)
         except (ArithmeticError, ValueError):
             number = math.nan
+        # So written it is true of NaN, too
         if not 0.0 < number < math.inf:
             what = f"{self.noun} {self.label}"
             raise SizingError(

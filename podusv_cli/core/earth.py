@@ -68,6 +68,7 @@ class Plane:
         square = c * c + s * s * stretch
         half = outward * c + upward * s * stretch
         rest = outward**2 + east**2 + upward**2 * stretch - A * A
+        # Of the two forms of the root the one that takes no difference of numbers nearly alike
         with np.errstate(invalid="ignore"):
             rise = -rest / (half + np.sqrt(half * half - square * rest))
         outward, upward = outward + rise * c, upward + rise * s

@@ -143,6 +143,7 @@ def _execute_module(whole: str, path: str, text: str) -> ModuleType:
     vars(module)[TEXT] = text
     sys.modules[whole] = module  # where pydantic looks up annotations, and inspect the source
     try:
+        # Not with this file's own `from __future__ import annotations`
         exec(compile(text, module.__file__, "exec", dont_inherit=True), vars(module))  # noqa: S102
     except BaseException as error:
         del sys.modules[whole]  # so that a mended file is read anew

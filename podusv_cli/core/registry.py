@@ -38,6 +38,7 @@ def kinds(package: str, base: type[Kind], plugins: Plugins = ()) -> dict[str, ty
     for thing in _members(package, plugins):
         if isinstance(thing, type) and issubclass(thing, base) and "kind" in thing.model_fields:
             kind = _kind(thing)
+            # A class is met again in every module that imports it, which is no clash
             if by_kind.setdefault(kind, thing) is not thing:
                 raise LawError(
                     f"{_place(thing)}: its kind {kind} is that of "

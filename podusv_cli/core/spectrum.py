@@ -6,7 +6,7 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 
-FEWEST = 4  # samples
+FEWEST = 4  # samples; of fewer Hann's window leaves one or none
 
 
 def periodogram(t: Vector, y: Vector) -> tuple[Vector, Vector]:

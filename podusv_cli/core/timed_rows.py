@@ -86,6 +86,7 @@ def lines_of(text: str) -> tuple[TextLine | None, list[TextLine]]:
 
     # starts a comment.
     """
+    # Programs on Windows begin a text with a byte order mark
     lines = [line.partition("#")[0].strip() for line in text.removeprefix("\ufeff").splitlines()]
     filled = [TextLine(number, _cells(line)) for number, line in enumerate(lines, 1) if line]
     if filled and len(filled[0].cells) > 1 and not any(map(_is_number, filled[0].cells)):

@@ -103,6 +103,8 @@ def _link(left: ast.expr, right: ast.expr, sign: ast.cmpop, tolerance: float) ->
     factors, between = SIDES.get(type(sign), _strictly)(tolerance), type(sign) not in SIDES
     with suppress(ValueError):  # not a plain number
         limit = float(ast.literal_eval(right))
+        # As `expressions.margins`: <= and >= move by a part of the limit's size, < and > by a
+        # part of the larger number
         edges = tuple(limit * f if between else limit + (f - 1.0) * abs(limit) for f in factors)
         return ClaimNumber(ast.unparse(left), "", edges, between)
     with suppress(ValueError):

@@ -68,6 +68,7 @@ def _own(scenario: Scenario, singles: Singles) -> Iterator[Choice]:
     seed = scenario.sweep.seed
     yield Choice(SEED, everywhere, seed, values=(seed + 1, seed + 2))
     others = tuple(_with_lengths(scenario, factor) for factor in RADIUS)
+    # Without a length in it the condition comes back as it is
     if scenario.sweep.success not in others:
         yield Choice(SUCCESS, everywhere, scenario.sweep.success, values=others)
 

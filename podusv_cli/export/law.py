@@ -114,6 +114,7 @@ class ExportedLaw:
     @classmethod
     def of(cls, scenario: Scenario) -> ExportedLaw:
         """The law of a scenario with one. Raises UsageError for a law that cannot stand alone."""
+        # Samples are read out of the log, which therefore has every step
         every = scenario.log.model_copy(update={"every": 1})
         scenario = scenario.model_copy(update={"log": every})
         plan = scenario.plan()
@@ -278,6 +279,7 @@ class ExportedLaw:
         It takes a sample's number and inputs (inputs,), and returns demand, signals and memory. It
         begins with the memory at t = 0.
         """
+        # Copies, as every stepper begins at the start of the run
         c, n = Vectors(*(vector.copy() for vector in self.vectors)), self.layout
         parts = [routine(self.pieces[name]) for name in PARTS.values()]
         step = routine(self.pieces[STEP])

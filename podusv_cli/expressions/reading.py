@@ -53,6 +53,7 @@ def syntax_tree(text: str, example: str) -> ast.expr:
     try:
         with warnings.catch_warnings(action="ignore"):  # Python's, about `1and a.iae < 2`
             tree = ast.parse(text.strip(), mode="eval").body
+    # Text that is nested too deep ends Python's parser in one of the last two
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise ExpressionError(f"cannot read {text!r}; example: {example}") from error
     if foreign := FOREIGN.search(text):

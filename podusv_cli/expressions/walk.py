@@ -22,6 +22,7 @@ ARITHMETIC: dict[type[ast.operator], Callable[..., Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
+    # By 0 it gives infinity or NaN, where Python's own division raises
     ast.Div: np.divide,
 }
 

@@ -40,6 +40,7 @@ def _choose_rows(demands: Vector) -> list[int]:
     if last < MOST_ROWS:
         return list(range(last + 1))
     bends = abs(np.diff(demands, 2, axis=0))  # at rows 1 to last - 1, so 1 is added below
+    # A demand that never bends has a largest bend of 0
     sharpest = np.argsort((bends / bends.max(axis=0).clip(1e-300)).sum(axis=1))[-half:] + 1
     return sorted({*range(0, last, -(-last // half)), *sharpest.tolist(), last})
 

@@ -216,6 +216,7 @@ def _printed_bound(law: PolarBackstepping, axes: Axes, observed: Observed | None
     if observed is None:
         return Bound(_least(candidates), math.nan, math.nan, candidates)
     rates = np.arange(1, TRIES) / TRIES * _least(candidates)
+    # At the largest lambda itself a filter may have no room left, so it is not among the rates
     rooms = (2.0 * (surge.A - rates), 2.0 * (yaw.A - rates))
     terms = _terms(law, observed, "epsilon", observed.epsilon)
     return _best(candidates, terms, rates, rooms, observed.alpha_dot)

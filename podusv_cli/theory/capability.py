@@ -183,6 +183,7 @@ def _largest(
     while it is held, halved while nothing is, then by bisection.
     """
     before, usual = near
+    # From the angle before nothing may have been held, or everything
     low, high = 0.0, max(min(before, usual), LEAST * usual)
     while holds(actuator, acting(high, angle), length):
         low, high = high, 2.0 * high

@@ -65,6 +65,7 @@ def _course(path: Path, t: float) -> Course | None:
     near = NEAR + (0.5 * fillet.time if fillet else 0.0)
     now, *around = rows = path.whole_targets([t, max(t - near, 0.0), t + near])
     (x, y), (ahead, across) = now[2:4], now[4:6]  # velocity [m/s] and acceleration [m/s2]
+    # A target that stays does not turn, and leaves nothing to divide by
     turn = (x * across - y * ahead) / max(x * x + y * y, 1e-300)
     if path.heads and abs(rows[:, PSI_D + 1 :] - (turn, 0.0)).max() > STRAIGHT:
         return None

@@ -52,4 +52,5 @@ def ranking(estimates: Mapping[str, StepEstimate]) -> Ranking | None:
 def _too_close(a: StepEstimate, b: StepEstimate) -> bool:
     """Whether two laws differ by less than the errors of their numbers."""
     gap, errors = abs(a.values[0] - b.values[0]), a.error + b.error
+    # Not `gap <= errors`, which is false where a number of one of them is NaN
     return errors > 0.0 and not gap > errors

@@ -38,6 +38,7 @@ def refine_grid(scenario: Scenario, halvings: int) -> TimeGrid:
         grid,
         step=grid.step / finer,
         steps=steps,
+        # At least 1, as the march counts instants modulo this
         log_every=max(steps, 1),
         hold_every=grid.hold_every * finer,
     )

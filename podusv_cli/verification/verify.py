@@ -111,6 +111,7 @@ def verify(
     Raises LawError.
     """
     singles = scenario.singles()
+    # Every law is checked before the first of the long runs
     for single in singles.values():
         single.ready()
     runs = {

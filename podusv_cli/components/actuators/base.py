@@ -265,6 +265,7 @@ class Actuator(KernelPart):
                 break
             shifts = SMALL * np.eye(len(state))
             slopes = [(self._drive_once(x, state + d, demand)[1] - rate) / SMALL for d in shifts]
+            # Least squares: a rate at its limit has no slope, and no equation could be solved
             state = state - np.linalg.lstsq(np.array(slopes).T, rate, rcond=None)[0]
         return tau
 

@@ -155,6 +155,7 @@ class Pod(Component):
         """The table's n and thrust [N], n increasing (rows, 2); without a table none."""
         rows = np.array(self.table or np.zeros((0, 2)))
         if self.table_in == "us" and self.pwm:
+            # With a span below 0 longer pulses drive astern, so the rows run the other way
             rows = rows[:: int(math.copysign(1.0, self.pwm.span))]
             rows[:, 0] = (rows[:, 0] - self.pwm.rest) / self.pwm.span
         return rows * [1.0, self.table_factor]
@@ -202,10 +203,12 @@ class Pod(Component):
         sides = []
         for way, full in zip((1.0, -1.0), self.most_n, strict=True):
             n = way * full * (dead_band + (1.0 - dead_band) * parts)
+            # A part s of full n has s^2 of the old thrust, so part^(exponent/2) has the new one
             thrusts = [self._thrust_at_rest(way * full * s) for s in parts ** (0.5 * exponent)]
             sides.append(np.column_stack([n, thrusts]))
         ahead, astern = sides
         rows = np.concatenate([astern[:0:-1], [[0.0, 0.0]], ahead[1:]])
+        # The edges of a dead band are rows of their own, without thrust
         if dead_band > 0.0:
             rows = np.concatenate([astern[::-1], [[0.0, 0.0]], ahead])
         rows = rows[np.append(True, np.diff(rows[:, 0]) > 0.0)]  # without n astern rest comes once

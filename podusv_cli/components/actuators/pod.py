@@ -48,7 +48,7 @@ from podusv_cli.core.signal import DEMAND, DEMAND_SIZE, Signal
 from podusv_cli.core.units import Scale, Scales
 
 SATURATED, SPEED_LIMITED, ANGLE_LIMITED, RATE_LIMITED, FLAGS = range(5)
-NEARLY = 1.0 - 1e-9
+NEARLY = 1.0 - 1e-9  # of a limit, to which a command comes but for rounding
 ROUNDS = 20  # until speeds and angles agree
 STRONGEST = 1e15  # N, N m; beside it a demand of 1 is lost in rounding
 TURNING = 0.25  # of an angle's lag, that a moment is late by

@@ -49,6 +49,7 @@ def rows_of(
     given = signals if rows.shape[1] == 1 + len(signals) else needed
     whole = np.zeros((len(rows), 1 + len(signals)))
     whole[:, [0, *(1 + signals.index(signal) for signal in given)]] = rows
+    # The cache hands the same rows to every run
     whole.flags.writeable = False
     return whole
 

@@ -81,6 +81,7 @@ class Loop:
     @property
     def fastest(self) -> float:
         """Largest eigenvalue's magnitude [1/s]; infinite where a number is."""
+        # numpy raises for a matrix of such numbers
         if not np.isfinite(self.matrix).all():
             return np.inf
         return float(np.abs(np.linalg.eigvals(self.matrix)).max())

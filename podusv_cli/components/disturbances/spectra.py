@@ -117,6 +117,7 @@ def in_bins(density: Density, edges: Vector) -> Vector:
     count = max(SAMPLES, math.ceil(ALL_SAMPLES / len(width)))
     places = (np.arange(count) + 0.5) / count
     samples = density(edges[:-1] + places[:, None] * width)
+    # Python's sum adds row by row; numpy's would be free in the order of the additions
     return np.asarray(sum(samples) * width / count)
 
 
@@ -232,6 +233,7 @@ def _shares(spreading: int) -> Vector:
     """
     # Simpson's rule needs the middle of every piece as well
     fine = math.pi * (np.linspace(0.0, 1.0, 2 * len(SHARES) - 1) - 0.5)
+    # A quarter turn's cosine may round to below 0
     base = np.maximum([cos_sin(angle)[0] for angle in fine.tolist()], 0.0)
     density = np.ones_like(base)
     for _ in range(2 * spreading):

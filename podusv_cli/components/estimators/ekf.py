@@ -43,6 +43,7 @@ from podusv_cli.core.signal import Signal
 N = 9  # numbers that are estimated: pose, velocities, loads
 MOVING = 6  # of them, those that something known makes change
 PACKED = N * (N + 1) // 2
+# Their place in the packed triangle, whose rows have 9, 8, 7, ... entries
 OF_V, OF_R = N + 30, N + 35  # in the filter's state, the variances of v and r
 COVARIANCE = Signal(
     "P_est",

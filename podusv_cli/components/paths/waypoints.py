@@ -187,6 +187,7 @@ class Waypoints(Path):
         knots, cubic = self._knots(), self._cubic()
         end = cubic(knots[-1])
         velocity = np.zeros(2) if self.after == "stop" else cubic(knots[-1], 1)
+        # In the order of a row: of each axis the cube and the square, 0, then velocity and place
         last = np.concatenate([[0, 0], velocity, end])
         rows = np.vstack(
             [cubic.c.transpose(1, 2, 0).reshape(-1, 8), last[[0, 1, 2, 4, 0, 1, 3, 5]]]

@@ -87,6 +87,7 @@ class Plan:
         plan = Plan(loop, self.grid, lambda plan: self.probe, self.recall)
         # The same objects have the same structure; else the structures themselves are compared
         if plan.outline == self.outline:
+            # A frozen value takes no assignment; its cached properties look into this dict first
             vars(plan).update((name, getattr(self, name)) for name in FOLLOWS)
         elif plan.structure != self.structure:
             raise ValueError(
@@ -338,6 +339,8 @@ class Plan:
             stages=np.zeros(5 * layout.states),
             sensed=loop.measurement.first(start, grid.step),
             delay_line=delay_line(loop.actuator.delay(), grid),
+            # The law may read as far into the held state as an estimator's goes; nobody uses what
+            # it makes of the numbers behind the first six
             held=np.zeros(HELD_SIGNALS + max(len(law.signals), len(estimator.states))),
             work=np.zeros(law.workspace()),
             seen=self.probe.first(),

@@ -123,6 +123,7 @@ def prepare(pieces: Sequence[Piece], tell: Callable[[float], None] | None = None
         if tell:
             tell(sum(done) / whole)
 
+    # Told at once, since the first piece may take seconds
     advance(0, 0.0)
     for piece in missing:
         if not piece.shipped_bitcode:  # numba is needed, and then imported once, before the forks

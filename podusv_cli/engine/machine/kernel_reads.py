@@ -98,6 +98,7 @@ class Reads:
     def _after_AugAssign(self, node: ast.AugAssign, known: Names) -> Names:
         """Names that are set behind `x += ...`, which reads x as well."""
         if isinstance(node.target, ast.Name):
+            # For Python this is a store, which `_read` passes over
             self._note(node.target, known)
         self._read(node, known)
         return known
@@ -147,6 +148,7 @@ class Reads:
             case ast.Call(func=ast.Name(id="range"), args=args):
                 numbers = [whole_number(arg, self._globals) for arg in args]
                 whole = [number for number in numbers if number is not None]
+                # A step of 0 is no range, and Python raises
                 return len(whole) == len(args) and whole[2:] != [0] and bool(range(*whole))
         return False
 

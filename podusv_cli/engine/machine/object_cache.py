@@ -167,6 +167,7 @@ def ingredients(
     As texts, for a digest. `numbered` counts the functions and attributes of modules that came
     before, so that each is described once; `alone` describes a function by itself.
     """
+    # Numbered before its parts are looked at, or a kernel that calls itself would have no end
     numbered[function] = len(numbered)
     yield from alone(function)
     # Names of attributes are among these names, too. That one of them may add to the digest what

@@ -37,6 +37,7 @@ MAKERS = (
 
 def bitcode(function: Any, prototype: Any, compiler: str) -> bytes | None:
     """The bitcode of this kernel as a C function with this prototype, if it came with podusv."""
+    # A digest reads the source of all that a kernel calls: not for a file that has nothing
     return _kernels().get(digest(function, prototype, compiler)) if _kernels() else None
 
 

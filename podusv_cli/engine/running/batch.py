@@ -290,6 +290,7 @@ class _Runs:
         """The plan of the run in this place. Raises InvalidLoop where its loop cannot be."""
         try:
             loop = self._loops[position]
+            # The first plan is made like itself, too: this checks that its parts fit
             return (self._plan or Plan.with_probe(loop, self._grid, self._probe)).like(loop)
         except (PodusvError, ValueError) as error:
             raise InvalidLoop(str(error)) from error

@@ -59,6 +59,7 @@ def ask_part(
 
     `part` describes the component, for messages. In a thread, since a law may never return.
     """
+    # Any number will do: without one the work counts as not done
     work = Work(lambda: int(ask() is None))
     work.finish()
     if isinstance(work.error, NoKernel):
@@ -110,6 +111,7 @@ def evaluate_law(plan: Plan, before: float) -> tuple[Vector, Vector, Vector]:
     that, so that one sees what it leaves unwritten. Raises LawError where it writes what it may
     only read.
     """
+    # Copies, as the plan hands the same arrays to every run and a law may write to them
     law, memory, target = plan.loop.controller, plan.first_memory.copy(), plan.first_target.copy()
     x, k, table = np.array(plan.loop.start), bundle(plan.law_constants), plan.law_table.copy()
     demands = len(DEMAND) + law.asks_sway()

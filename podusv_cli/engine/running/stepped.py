@@ -81,6 +81,7 @@ class SteppedRun:
 
         Shape (probe.size,).
         """
+        # Nothing has marched yet, or the last instant has had its half weight already
         if not 0 < self.reached <= self.grid.steps:
             return self.vectors.seen.copy()
         # March over one instant as if it were the last, then put all numbers back

@@ -63,11 +63,13 @@ class Work:
     def start(self) -> None:
         """Start a thread, which ignores the floating-point errors that this one ignores."""
         self.started = True
+        # Python waits for any thread but a daemon before it ends, and a march may hang
         Thread(target=copy_context().run, args=(self._run,), daemon=True).start()
 
     def wait(self, seconds: float = GLANCE) -> None:
         """Wait until the bell rings, but not longer than this."""
         with suppress(Empty):
+            # In the main thread a wait without an end would not see Ctrl-C
             self._bell.get(timeout=seconds)
 
     def hangs(self) -> bool:

@@ -49,6 +49,7 @@ def spread(march: Any) -> Any:
     given = f"Parts({', '.join(parts)}), {', '.join(names)}"
     text = f"def {march.__name__}({', '.join((*parts, *names))}):\n    return march({given})"
     scope: dict[str, Any] = {"march": march, "Parts": Parts, "__name__": march.__module__}
+    # The text is in no file, so those that look for a kernel's source look here
     scope[TEXT] = text
     exec(text, scope)  # noqa: S102
     return kernel(scope[march.__name__])

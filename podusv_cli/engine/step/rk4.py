@@ -203,6 +203,8 @@ def write_row(k: int, t: float, c: Vectors, n: Layout) -> None:
 # h [s]; `first` is the instant at which this march began, before which no stage is known. The load
 # comes before the measurement, which sees the waves; the place on the path before the samples,
 # which need the target.
+# `again` compares times: (k - 1) h + h may round to another number than k h, and what depends on
+# the time is then computed for k h.
 @kernel
 def arrive(k: int, first: int, h: float, p: Parts, c: Vectors, n: Layout) -> None:
     """Measure, sample and evaluate instant k."""
