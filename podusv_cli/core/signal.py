@@ -51,6 +51,7 @@ class Signal:
         head, *rest = self.name.split("_")
         below = ",".join(rest)
         written = f"{head}_{{{below}}}" if len(below) > 1 else self.name
+        # The one way to set a field of a frozen value
         object.__setattr__(self, "symbol", self.symbol or written)
 
     @property

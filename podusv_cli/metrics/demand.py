@@ -32,6 +32,7 @@ def watch(steady: float, row: Vector, k: Any, seen: Vector) -> None:
 
 def _variation(position: int) -> Result:
     """The total variation gathered at this position; NaN with fewer than two steady instants."""
+    # Over a single instant nothing varies, and 0 would mark a run as the best
     return lambda seen, step: float(seen[position]) if seen[SETTLED] > 1.0 else math.nan
 
 

@@ -70,6 +70,7 @@ def _rms(seen: Vector, step: float) -> float:
 def _size(layout: Measured) -> int:
     """How many numbers are gathered; none where no law follows a path with a cross-track error."""
     places = layout.loop.path.places[: len(PLACES)]
+    # Legs whose last waypoint is held have one place more behind these
     follows = places == PLACES and layout.loop.controller.aims()
     return SIZE if follows else 0
 

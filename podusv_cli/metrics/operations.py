@@ -50,6 +50,7 @@ class OperationTally:
 
     def number(self, number: Any) -> Counted:
         """A number that counts; numpy's, because division by zero is no error in a law."""
+        # numpy's number, which divides by 0 without raising
         return Counted(np.float64(number), self)
 
     def vector(self, numbers: Any) -> Any:

@@ -102,6 +102,7 @@ def _thrusters(layout: Measured) -> dict[str, float]:
 
 def _variation(seen: Vector, step: float) -> float:
     """The total variation; NaN with fewer than two steady instants."""
+    # Over a single instant nothing varies, and 0 would mark a run as the best
     return float(seen[TV]) if seen[SETTLED] > 1.0 else math.nan
 
 

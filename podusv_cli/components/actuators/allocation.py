@@ -100,6 +100,8 @@ def allocate(
 
 
 # Arguments and outputs as those of `allocate`.
+# `most` is never 0, as forces are taken in parts of it; k.sway_weight counts in the squares, so its
+# root is taken.
 @kernel
 def by_least_squares(
     state: Vector, demand: Vector, flows: Vector, k: Any, table: Vector, T: Vector, delta: Vector

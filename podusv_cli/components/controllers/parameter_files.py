@@ -27,6 +27,7 @@ def parameters(text: str) -> dict[str, float]:
     A name that comes twice must have the same number.
     """
     found: dict[str, float] = {}
+    # Programs on Windows begin a text with a byte order mark
     for number, line in enumerate(text.removeprefix("\ufeff").splitlines(), 1):
         cells = _cells(line.partition("#")[0])
         if not cells:

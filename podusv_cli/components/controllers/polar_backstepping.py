@@ -193,6 +193,7 @@ class PolarBackstepping(TrackingController):
 
     def constants(self) -> dict[str, float]:
         """The fields' numbers, and where xi_u and xi_r are in the memory (0 for nowhere)."""
+        # They are the last two numbers of the memory
         at = sum(size for _, size in self.slots()) - 2 if self.wants_loads() else 0
         return super().constants() | {"auxiliary": float(at)}
 
@@ -210,6 +211,7 @@ class PolarBackstepping(TrackingController):
 
         Numbers or arrays, like the virtual controls. Never below their values at 0.
         """
+        # In the shape of what is given
         return alpha_u * 0.0 + np.inf, alpha_r * 0.0 + np.inf
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:

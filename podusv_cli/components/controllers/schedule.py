@@ -64,6 +64,7 @@ def _rows(text: str) -> Vector:
     if rows.shape[1] >= WITH_MOTION:
         psi = (WITH_SWAY if rows.shape[1] == WITH_BOTH else TIMED) + 2
         rows[:, psi] = np.unwrap(rows[:, psi])
+    # The cache hands the same rows to every run
     rows.flags.writeable = False
     return rows
 

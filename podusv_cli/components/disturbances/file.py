@@ -21,6 +21,7 @@ LAYOUTS = {4: ("t [s]", "b_u [N]", "b_v [N]", "b_r [N m]")}
 def _rows(text: str) -> Vector:
     """The rows t [s], b_u [N], b_v [N], b_r [N m] of a text (rows, 4). Raises ValueError."""
     rows = timed_rows(text, "the record", LAYOUTS)
+    # The cache hands the same rows to every run
     rows.flags.writeable = False
     return rows
 

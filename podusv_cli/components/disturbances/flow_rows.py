@@ -40,6 +40,7 @@ def read_flow(text: str, most: float) -> Vector:
         )
     rows[:, 2] = np.unwrap(rows[:, 2])
     _check_turns(rows)
+    # The cache hands the same rows to every run
     rows.flags.writeable = False
     return rows
 

@@ -61,6 +61,7 @@ def _whole(peak: Peak) -> float:
 
 def _power(x: float, exponent: float) -> float:
     """x^exponent by podusv's own logarithm, with the same bits on all machines."""
+    # 0 has no logarithm, by which `power` is computed
     return float(power(np.array([x]), exponent)[0]) if x else 0.0
 
 

@@ -109,6 +109,7 @@ def spread(f: Vector, packed: Vector, q: Vector, rate: Vector) -> None:
 # h (6) is the derivative, `innovation` measured less expected, sigma its deviation. Changes state:
 # estimate (9), then packed P (45), then sums of squared innovations (6) and their numbers (6). A
 # value that is late depends on several states, so all of h counts. ph (9) is P h.
+# At the end of the triangle `at` is where the sums of innovations begin.
 @kernel
 def take_in(i: int, h: Vector, innovation: float, sigma: float, state: Vector) -> float:
     """Correct estimate and covariance by the measured value i, whose derivative is h.

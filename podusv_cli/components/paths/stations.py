@@ -67,6 +67,7 @@ class Stations(Path):
 
     def passed_by(self, share: float) -> dict[str, float]:
         """Stations that are done at a `share` from 0 to 1; so little is added that 3/3 is 3."""
+        # NEAR: a whole number of stations may have been rounded to just below it
         return {"station": float(int(np.clip(share, 0.0, 1.0) * len(self.poses) + NEAR))}
 
     def constants(self) -> dict[str, float]:

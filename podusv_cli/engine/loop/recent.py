@@ -36,4 +36,5 @@ class Recent:
 
 def _same(one: Any, other: Any) -> bool:
     """Whether two arguments are the same: one object, or equal numbers."""
+    # A float is made anew by whoever computes it, so equal ones are seldom one object
     return one is other or (isinstance(one, float) and one == other)

@@ -140,6 +140,7 @@ class Work:
             self.result = self._function()
         except BaseException as error:  # a law may raise anything
             self.error = error
+        # Before the bell rings: whoever it wakes looks at this
         self.over = True
         self._bell.put(None)
 
