@@ -113,6 +113,7 @@ def _lanes(
     names of choices.
     """
     draws = report.tried.draws
+    # By rank a number that lies far out weighs no more than the others
     ranks = np.argsort(np.argsort(numbers))
 
     def follows(column: int) -> float:

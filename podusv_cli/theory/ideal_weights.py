@@ -115,6 +115,7 @@ def _ridge_solver(phi: Vector) -> Callable[[Vector, float], Vector]:
     tall = phi.shape[0] >= phi.shape[1]
     short = phi if tall else phi.T
     square = _gram_matrix(short)
+    # Where no node ever answers the matrix is 0, and any size will do
     least = SINGULAR * float(total(square.diagonal())) or 1.0
 
     def weights(f: Vector, c: float) -> Vector:

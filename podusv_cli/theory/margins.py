@@ -168,6 +168,7 @@ def _gains(cut: Cut, omega: Vector, L: Complex) -> list[float]:
     # With a gain of -1/L the response passes through -1; L is real at these w, and at 0
     at = _roots(lambda w: float(cut.response(np.array([w]))[0, 0, 0].imag), omega, L.imag)
     values = [complex(cut.response(np.array([w]))[0, 0, 0]).real for w in at]
+    # With a pole at 0 the response has no end there
     if abs(np.linalg.eigvals(cut.open_matrix)).min() > SLOWEST:
         values.append(complex(cut.response(np.zeros(1))[0, 0, 0]).real)
     return [-1.0 / value for value in values if value < 0.0]
@@ -193,4 +194,5 @@ def _peak(cut: Cut, omega: Vector, values: Vector, of: Callable[[complex], float
     minimum = minimize_scalar(
         lambda w: -of(complex(cut.response(np.array([w]))[0, 0, 0])), bounds=ends, method="bounded"
     )
+    # The search never looks at this frequency itself, and may end lower
     return max(float(values[at]), -float(minimum.fun))

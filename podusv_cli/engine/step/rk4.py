@@ -232,6 +232,7 @@ def show_probe(k: int, h: float, p: Parts, c: Vectors, n: Layout) -> None:
 
 
 # h [s]; `first` is the instant at which this march began.
+# What is not finite reaches neither probe nor log: what they have of the instants before is kept.
 @kernel
 def instant(k: int, first: int, h: float, p: Parts, c: Vectors, n: Layout) -> bool:
     """Evaluate, probe and log instant k; whether all its numbers are finite."""
