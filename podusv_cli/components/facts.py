@@ -65,6 +65,7 @@ class Facts:
         """
         x, axis = np.array([0.0, 0.0, 0.0, u, 0.0, 0.0]), int(abs(demand[1]) > abs(demand[0]))
         try:
+            # Loads are surge, sway, yaw, where a demand is surge, yaw
             return float(self.actuator.settled(x, np.array(demand))[2 * axis])
         except Exception as error:  # of a plug-in
             raise SizingError(f"{describe(self.actuator)}: {in_a_line(error)}") from error

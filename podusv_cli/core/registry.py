@@ -117,6 +117,7 @@ def _signals(thing: Any) -> Iterator[Signal]:
     elif isinstance(inside, Signal):
         yield inside
     elif isinstance(thing, type):
+        # Its own alone: those that it inherits come with the class that declares them
         yield from _signals(vars(thing).get("signals"))
     elif isinstance(thing, (tuple, dict)):
         parts = thing.values() if isinstance(thing, dict) else thing

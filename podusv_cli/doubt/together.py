@@ -48,6 +48,7 @@ def draw_worlds(choices: Sequence[Choice], seed: int, count: int) -> Draws:
     name and the draw's number alone.
     """
     moving = [c for c in choices if (c.range or c.rows) and not (c.task or c.beside)]
+    # Without any choice the list is empty, and the array would have one axis alone
     shares = np.array(
         [random_words.uniforms((seed, STREAM, choice.name), 0, count) for choice in moving]
     ).reshape(len(moving), count)

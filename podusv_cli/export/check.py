@@ -170,6 +170,7 @@ def _library(folder: Path, place: Path, about: About, listed: Collection[str]) -
     path = place / f"law{PLATFORMS[name].library}"
     path.write_bytes(shared_library(files, name, PLATFORMS[name]))
     library, numbers = ctypes.CDLL(str(path)), ctypes.POINTER(ctypes.c_double)
+    # ctypes would take results for an int, which has half of a pointer's bits
     library.podusv_law_size.restype = ctypes.c_size_t
     library.podusv_law_signals.restype = library.podusv_law_memory.restype = numbers
     law = ctypes.create_string_buffer(library.podusv_law_size())

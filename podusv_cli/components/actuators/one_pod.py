@@ -180,6 +180,7 @@ class Pod(Component):
 
         None for a rudder with a bent curve, since its force goes with n^2.
         """
+        # No dead band and the exponent 2 leave the curve's form as it is
         bent = (dead_band, exponent) != (0.0, 2.0)
         if bent and self.rudder:
             return None

@@ -92,6 +92,7 @@ def check_rows(rows: Vector) -> None:
             f"has a table from n = {n[0]:g} to {n[-1]:g}; it must begin at rest (0) or astern and "
             "end ahead"
         )
+    # Rest need not be a row: it may lie between two
     at_rest = float(np.interp(0.0, n, thrusts))
     if at_rest != 0.0:
         raise ValueError(

@@ -95,6 +95,7 @@ def network_range(case: Any) -> Sentences:
 def off_network(scenario: Any, log: Recording) -> Sentences:
     """Warn of times at which no node of the network is within two widths of (u, v, r)."""
     name = NODE_DISTANCE.name
+    # The stability monitor has logged it, where there is one
     distance = operator.itemgetter(name) if name in log else node_distance.compute
     off = rows_where(log, lambda part: distance(part) > FAR)
     if off.any():

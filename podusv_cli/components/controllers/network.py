@@ -76,6 +76,7 @@ class Network(KernelPart):
             raise ValueError(f"every axis needs at least one node, got {list(self.nodes)}")
         if self.count > MOST_NODES:
             raise ValueError(f"has {self.count:,} nodes, at most {MOST_NODES:,} are possible")
+        # Neither has a spacing that `spread` could be times
         if self.widths is None and (self.centers or any(n < 2 for n in self.nodes)):
             raise ValueError(
                 "widths must be given for listed centres and for an axis with one node"
@@ -155,6 +156,7 @@ def _table(network: Network) -> Vector:
     centers[:, :plane] = network.center_array()[:plane].T
     exponents[:, :plane] = 1.0 / (2.0 * network.width_array()[:, None] ** 2)
     if not network.centers:
+        # The exponent along u is read before it is taken out of the plane
         line = slice(plane, plane + along)
         centers[0, line], exponents[0, line] = network.axes()[0], exponents[0, 0]
         exponents[0, :plane] = 0.0

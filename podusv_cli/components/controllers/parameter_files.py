@@ -109,6 +109,7 @@ def of_ardupilot(text: str, beside: Collection[str]) -> tuple[Keys, list[str]]:
     if {*CRUISE} & given.keys() and (speed > 0.0 or feed > 0.0):
         keys["speed_FF"] = feed + (0.01 * throttle / speed if speed > 0.0 else 0.0)
         taken |= {*CRUISE}
+    # Rover before 4.3 has L1 guidance and no position controller
     if "PSC_POS_P" not in given and "NAVL1_PERIOD" in given and "guidance" not in beside:
         keys["guidance"] = "l1"
         remarks.append("it has NAVL1_PERIOD and no PSC_POS_P, so guidance is l1")

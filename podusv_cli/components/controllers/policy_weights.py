@@ -161,6 +161,7 @@ def _layers(arrays: Mapping[str, Vector]) -> Iterator[tuple[str, Vector, Vector]
     if len(networks := sorted({of for of, _ in places})) != 1:
         found_in = " and ".join(map(repr, networks)) or "none"
         raise ValueError(f"must have the layers of one network, found {found_in}; save that alone")
+    # In the order of their numbers: as text 10 would come before 2
     for of, number in sorted(places):
         name = f"{of}{number}"
         for part in (f"{name}.weight", f"{name}.bias"):

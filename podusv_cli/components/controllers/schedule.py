@@ -62,6 +62,7 @@ def _rows(text: str) -> Vector:
     else:
         rows = timed_rows(text, NOUN, LAYOUTS)
     if rows.shape[1] >= WITH_MOTION:
+        # The heading, third of the state: a cubic over a jump by 2 pi would turn the vessel round
         psi = (WITH_SWAY if rows.shape[1] == WITH_BOTH else TIMED) + 2
         rows[:, psi] = np.unwrap(rows[:, psi])
     # The cache hands the same rows to every run

@@ -259,6 +259,7 @@ class Waves(Disturbance):
         drawn = spectra.cosines(self._variance(), self._edges(), *stream, self.amplitudes)
         rate = self._rates(drawn.rate)
         away = spectra.directions(self.spreading, count, *stream)
+        # Not numpy's cosine, whose last bits depend on the processor
         c, s = np.transpose([cos_sin(self._travel + angle) for angle in away.tolist()])
         number = rate * rate / spectra.GRAVITY
         ends = _shares(self.reflection_u, BOW_AND_STERN, number * vessel.length)

@@ -164,6 +164,7 @@ class Wind(Disturbance):
                 f"lowest {self.lowest:g} Hz must be below highest {self.highest:g} Hz; 0.0017 and "
                 "0.5 are usual"
             )
+        # It raises where the profile has no wind left at that height
         share_of_wind(self.at, SHEAR[self.gusts](self))
         return self
 

@@ -80,6 +80,7 @@ class Legs(Path):
     @model_validator(mode="after")
     def _check_way(self) -> Self:
         """Raises ValueError for points of which no way can be made."""
+        # Raises as `Waypoints` does
         self._traveller()
         return self
 

@@ -50,6 +50,7 @@ class Stations(Path):
     @model_validator(mode="after")
     def _check_poses(self) -> Self:
         """Raises ValueError for a path without a pose."""
+        # Raises as `Poses` does
         self._traveller()
         return self
 

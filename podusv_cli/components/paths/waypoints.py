@@ -85,6 +85,7 @@ class Waypoints(Path):
         """Raises ValueError for points of which no way can be made, or an unfit fillet."""
         if len(self.points) < 2:
             raise ValueError(f"needs at least two points, has {len(self.points)}")
+        # Points too far apart are refused by the sentence below, without numpy's warnings
         with np.errstate(all="ignore"):
             knots = self._knots()
             if np.any(np.diff(knots) <= 0):

@@ -49,6 +49,7 @@ def check_law(plan: Plan) -> None:
         ask_part(partial(describe, loop.path), lambda: plan.first_target, OF_NUMBERS)
         ask_part(partial(describe, loop.controller), partial(_check_declared, plan))
         ask_part(partial(describe, loop.controller), partial(_ask, plan), OF_NUMBERS)
+    # In its source, too: it may write in a branch that the first instant does not take
     check_arguments(law, READ)
 
 

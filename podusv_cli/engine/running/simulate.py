@@ -64,6 +64,7 @@ def run(
     march and keeps what was logged. `compiled=False` runs the same kernels as plain Python.
     `allocate` gives the room for the logged rows; the recording's signals are views of it.
     """
+    # Asked before the march, as it raises for signals of one name
     about = plan.about
     vectors, last, advance = begin_march(plan, compiled, allocate)
     with np.errstate(all="ignore"), interrupts_deferred():
@@ -85,6 +86,7 @@ def begin_march(
     reached. `allocate` gives room for the log. Raises LawError for parts that do not fit.
     """
     plan.loop.check_fit(plan.grid.step)
+    # Instants are 0 to `steps`, and a march leaves its last number out
     vectors, last = plan.vectors(plan.grid.rows, allocate), plan.layout.steps + 1
     advance = marcher(plan, compiled)(vectors, plan.layout, plan.grid.step)
     return vectors, last, partial(advance, 0, last)
