@@ -77,7 +77,7 @@ class Component(BaseModel):
     rules: ClassVar[dict[str, Rule]] = {}
     stands_alone: ClassVar[bool] = False
     noun: ClassVar[str] = "component"
-    # Strict: true is no 1.0 and "1.5" no number. NaN is refused, since no limit would keep it out
+    # Strict: true is no 1.0 and "1.5" no number. Without limits a field would take NaN
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
     @property

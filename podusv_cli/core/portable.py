@@ -179,8 +179,7 @@ def _ratio(x: Vector, part: tuple[tuple[float, ...], tuple[float, ...]]) -> Vect
 
 def standard_normal(u: Vector) -> Vector:
     """The standard normal numbers (n,) that a share u (n,) in (0, 1) of all are below."""
-    # Borders and shifts of the three parts are the published ones; the smaller of u and 1 - u keeps
-    # its digits near both ends
+    # Borders and shifts of the three parts are the published ones; r is that of the nearer tail
     q = u - 0.5
     z = q * _ratio(0.180625 - q * q, CENTRAL)
     out = np.abs(q) > 0.425

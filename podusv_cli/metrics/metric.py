@@ -57,7 +57,7 @@ def close_integrals(seen: Vector, integrals: int, step: float) -> Vector:
     whole, added = seen.copy(), seen[integrals : 2 * integrals]
     if integrals:
         # The very first integral is the time, so its last amount tells the last instant's weight
-        # (a run that ended at its first instant has this weight too, but nothing before it)
+        # A run of its first instant alone has half a weight, too, but no time before it
         at_end = (whole[0] > added[0]) & (added[0] == 0.5 * step)
         sums = whole[:integrals]
         with np.errstate(all="ignore"):  # nothing was added, or the run diverged

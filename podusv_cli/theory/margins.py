@@ -194,5 +194,5 @@ def _peak(cut: Cut, omega: Vector, values: Vector, of: Callable[[complex], float
     minimum = minimize_scalar(
         lambda w: -of(complex(cut.response(np.array([w]))[0, 0, 0])), bounds=ends, method="bounded"
     )
-    # The search never looks at this frequency itself, and may end lower
+    # The search need not look at this frequency itself, and may end lower
     return max(float(values[at]), -float(minimum.fun))

@@ -208,6 +208,7 @@ class SteppedBatch:
             "target": target,
         }
         self._aim = in_lanes("path", path, names, shared, vectors)
+        # Of all parts the law alone takes state, target and signals
         self._look = in_lanes("law", look, (), NOTHING, vectors | {"signals": view})
         self.law_table, self._seen, self._view = map(self._by_run, (c.law_table, c.seen, view))
         changing = [getattr(c, name) for name in CHANGING]
