@@ -158,7 +158,7 @@ class Facts:
     @cached_property
     def w_N(self) -> float:
         """sqrt(N/m33) [1/s]: how fast the moment turns the hull."""
-        # At one side no moment may be left
+        # One side may have no moment left, or less than none
         return math.sqrt(max(self.N, 0.0) / self.nominal.m33)
 
     @cached_property

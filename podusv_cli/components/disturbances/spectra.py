@@ -233,7 +233,6 @@ def _shares(spreading: int) -> Vector:
     """
     # Simpson's rule needs the middle of every piece as well
     fine = math.pi * (np.linspace(0.0, 1.0, 2 * len(SHARES) - 1) - 0.5)
-    # A quarter turn's cosine may round to below 0
     base = np.maximum([cos_sin(angle)[0] for angle in fine.tolist()], 0.0)
     density = np.ones_like(base)
     for _ in range(2 * spreading):

@@ -303,7 +303,7 @@ class _Runs:
         try:
             with interrupts_enabled():
                 return make()
-        except KeyboardInterrupt:
+        except KeyboardInterrupt:  # the last branch would take it for an error of the law
             raise
         except InvalidLoop as error:
             self._batch.refuse(position, "invalid", str(error))
