@@ -135,6 +135,7 @@ class Facts:
         tightest one where 10 deg/s take more than N.
         """
         rate, least = TRIAL
+        # The trial's own yaw rate is in the range even where 5 U/L is less
         highest = max(SPINNING * self.U / self.L, rate)
         if not least <= self._turning(rate) <= 1.0:
             wanted = least if self._turning(rate) < least else 1.0
@@ -237,6 +238,7 @@ class Facts:
         """The facts in a line, with what limits the pace of yaw; or why there are none."""
         try:
             return self._in_words()
+        # What quotes the facts is not to fail where an actuator cannot be asked
         except (SizingError, ArithmeticError, ValueError) as error:
             return f"no facts: {in_a_line(error)}"
 

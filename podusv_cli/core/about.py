@@ -269,6 +269,7 @@ class RunAbout(_PlainJson):
         """Raises ValueError where a part that readers ask for is missing or is no mapping."""
         try:
             parts = [self.section(key) for key in ("vessel", "path", "controller", *self.said)]
+        # They are read from a file, and may be anything
         except (LookupError, TypeError, ValueError):
             parts = [None]
         if "name" not in self.values or not all(isinstance(part, dict) for part in parts):

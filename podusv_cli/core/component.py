@@ -107,6 +107,7 @@ class Component(BaseModel):
         rule = self.rules[name]
         try:
             number = rule.of(facts, type(self).model_fields[name].default)
+        # A hull or an actuator may leave a rule without a number, which is said below
         except (ArithmeticError, ValueError):
             number = math.nan
         # So written it is true of NaN, too

@@ -227,6 +227,7 @@ def _modules(
         inside = [(path.relative_to(top), path) for top in folders for path in Path(top).rglob("*")]
         alone = [Path(spec.origin)] if spec and spec.origin and not folders else []
         files = [*inside, *((Path(path.name), path) for path in alone)]
+        # In one order on every system, as a digest is made of them
         yield top, bool(folders), sorted(files)
 
 

@@ -126,6 +126,7 @@ def _numbers(lines: list[TextLine], noun: str) -> Vector:
     if wrong := _wrong_cell(lines, noun):
         raise ValueError(wrong)
     rows = np.array([cells for _, cells in lines], dtype=float)
+    # A cell may be nan, or as large as 1e999
     if not np.all(np.isfinite(rows)):
         row, column = np.argwhere(~np.isfinite(rows))[0].tolist()
         where = f"line {lines[row].number}, column {column + 1} of {noun}"

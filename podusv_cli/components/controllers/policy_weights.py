@@ -123,6 +123,7 @@ def _period(remarks: Mapping[str, str]) -> float | None:
     """The remark `PERIOD` as a number; None where there is none. Raises ValueError."""
     if PERIOD not in remarks:
         return None
+    # A remark is text, which may be no number
     with suppress(ValueError):
         if 0.0 < (period := float(remarks[PERIOD])) < math.inf:
             return period

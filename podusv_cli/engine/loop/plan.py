@@ -242,7 +242,7 @@ class Plan:
         return self.layout, self.functions
 
     @cached_property
-    @np.errstate(all="ignore")
+    @np.errstate(all="ignore")  # numbers beyond all limits are for the run to tell
     def constants(self) -> dict[str, dict[str, float]]:
         """The constants that the kernels of each part read, by name."""
         loop, recall, step = self.loop, self.recall, self.grid.step

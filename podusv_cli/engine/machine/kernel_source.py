@@ -62,6 +62,7 @@ def _nodes(text: str) -> dict[Any, ast.FunctionDef]:
     """Every function of a file by name and first line, as source; decorators count as lines."""
     functions = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)]
     return {
+        # As Python counts: a code begins with its first decorator
         (node.name, min([node.lineno, *(d.lineno for d in node.decorator_list)])): node
         for node in functions
     }

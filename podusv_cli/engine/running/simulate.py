@@ -67,6 +67,7 @@ def run(
     # Asked before the march, as it raises for signals of one name
     about = plan.about
     vectors, last, advance = begin_march(plan, compiled, allocate)
+    # A run that diverges overflows before it ends, and its recording tells
     with np.errstate(all="ignore"), interrupts_deferred():
         ending = march(
             advance,
@@ -176,6 +177,7 @@ def recording_of(plan: Plan, vectors: Vectors, ending: Ending) -> Recording:
     signals = {name: column for name, column in named.items() if name in plan.about}
     status, message = RECORDED[ending.status], ""
     if status == "interrupted":
+        # As many instants are good as were reached, and the first is at t = 0
         message = f"interrupted after t = {max(ending.reached - 1, 0) * plan.grid.step:.6g} s"
     if status == "diverged":
         message = f"diverged {why(plan, vectors, ending)}; {_last_words(signals)}"
@@ -196,6 +198,7 @@ def _culprit(vectors: Vectors, labels: list[str], at: float) -> str:
     """
     now = np.concatenate([[at], vectors.s, vectors.row[:-BEFORE]])
     named = zip(labels, now, strict=True)
+    # So written it finds NaN, too
     bad = next((name for name, x in named if not abs(x) <= rk4.LARGEST), "?")
     return f"{bad} is not finite"
 
