@@ -69,8 +69,8 @@ def row(answer: DoubtAnswer) -> list[str]:
 def write(writer: RunWriter, report: DoubtReport, text: str, *, figures: bool) -> None:
     """All files of the folder but the manifest; `text` is the scenario's file."""
     writer.add("scenario.yaml", text.encode())
-    for name, text in report.scenario.plugin_files().items():
-        writer.add(name, text.encode())
+    for name, source in report.scenario.plugin_files().items():
+        writer.add(name, source.encode())
     writer.add_json("doubt.json", {"claims": [as_json(answer) for answer in report.answers]})
     for name, rows in {
         "doubt.csv": table(report.answers),

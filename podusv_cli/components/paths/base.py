@@ -113,7 +113,7 @@ class Path(KernelPart):
         """Where this share of the way lies behind the vessel, from 0 to 1: numbers of its `places`.
 
         It does where they are reached, the first that differs decides; at most two, or metrics
-        raise LawError. Share 1 is the end of the path. None for a path that has no end.
+        raise LawError. Share 1 is the end of the path; a path without one has no numbers.
         """
         return {}
 

@@ -62,7 +62,7 @@ def digest(function: Any, prototype: Any, compiler: str) -> str:
 def _kernels() -> Mapping[str, bytes]:
     """The bitcode of all kernels by digest.
 
-    None where the file is missing or damaged, or made by other files of podusv than are here.
+    No kernels where the file is missing or damaged, or made by other files of podusv than are here.
     """
     with suppress(OSError, lzma.LZMAError, ValueError, TypeError):
         head, _, body = lzma.decompress(FILE.read_bytes()).partition(b"\n")
