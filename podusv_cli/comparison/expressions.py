@@ -69,6 +69,7 @@ class _ExampleRun:
 
     signals: Mapping[str, Signal]
     metrics: Mapping[str, MetricAbout]
+    # No window that a claim names lies beyond its end.
     until = math.inf
     every = 1
     ending = ""
@@ -95,6 +96,7 @@ class _ExampleRun:
             )
         usable = [s.name for s in self.signals.values() if not (s.fixed or s.axes)]
         known_name(name, [*usable, *self.metrics], "signal or metric")
+        # Two that grow: they serve as times, too, and a rate can be taken of them.
         return np.array([0.0, 1.0])
 
 

@@ -26,6 +26,7 @@ def with_optimum_ratios(runs: Sequence[PastRun], extras: Extras) -> list[PastRun
         for i, run in enumerate(related_runs):
             same = [other for other in optima if not any(_other(run, other))]
             if same:
+                # Each optimum is a local one, so the best of them counts.
                 least = min(other.metric(metric) for other in same)
                 cost = {**run.cost, ratio.name: run.metric(metric) / least}
                 related_runs[i] = replace(run, cost=cost)

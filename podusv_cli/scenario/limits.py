@@ -96,6 +96,7 @@ def estimate(scenario: Scenario, plan: Plan) -> Size:
 def disk_needed(sizes: Sequence[Size], at_once: int) -> float:
     """Bytes that have to be free on the disk for these runs, `at_once` of them made at a time."""
     scratch = sorted(size.scratch for size in sizes)[-at_once:]
+    # The least of each: a run is refused only where it surely does not fit.
     return sum(size.least for size in sizes) + sum(scratch)
 
 

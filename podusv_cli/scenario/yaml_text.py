@@ -250,6 +250,7 @@ class _Reader:
             raise _CannotContinue(
                 self._mark(0, 0), "starts with a byte order mark; save as UTF-8 without BOM"
             )
+        # The events: start of the stream, start of the document, its value, and the two ends.
         self._next()
         if isinstance(self._next(), yaml.StreamEndEvent):
             raise _CannotContinue(Mark(self._source), "is empty")

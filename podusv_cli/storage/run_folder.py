@@ -94,6 +94,7 @@ class RunWriter:
         try:
             check_free_space(final, needed, "log less often (log.every), or elsewhere (--out)")
         except StorageError:
+            # The `with` block is not entered, so that nothing else would remove the hidden folder.
             self._staging.discard()
             raise
 
@@ -134,9 +135,11 @@ class RunWriter:
             self.add_json(MISSING, self.extras.as_json())
         remove_abandoned(self.folder)  # left by killed processes of a comparison
         manifest.write(self.folder, status)
+        # Before the renaming: after a crash the final name must not stand for missing files.
         for inner, _, _ in os.walk(self.folder):
             files.sync_folder(Path(inner))
         try:
+            # Once more: something may have come there while the simulation ran.
             _check_replaceable(self.final, self._force)
             self._staging.publish(replace=self._force and whole and not missing)
         except Taken as error:
@@ -234,6 +237,7 @@ class UnreadLog:
     @cached_property
     def recording(self) -> Recording:
         """Its content. Raises StorageError."""
+        # Here, so that commands that look at numbers alone do not load HDF5.
         from podusv_cli.storage import log_reader  # h5py is slow to import
 
         return log_reader.read_log(self.path)

@@ -61,6 +61,7 @@ class Staging:
                 if not replace:
                     raise
                 self._replace()
+        # After an exchange the older folder lies in the box, and goes with it.
         self.discard()
         files.sync_folder(self.final.parent)
 
@@ -75,6 +76,7 @@ class Staging:
         except OSError as error:
             if error.errno not in _TAKEN:
                 raise
+            # Renaming replaces no folder but an empty one, so nothing can be lost by trying.
             text = f"{self.final} is there already and is left as it is"
             raise Taken(text) from error
 

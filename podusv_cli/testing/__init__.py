@@ -135,6 +135,7 @@ def is_finite(component: Component) -> None:
 def remembers_nothing(component: Component) -> None:
     """The same state gives the same bits, whatever was evaluated in between."""
     first = [evaluate_component(component, seed) for seed in range(STATES)]
+    # In the other order, as a memory of the state before would show.
     again = [evaluate_component(component, seed) for seed in reversed(range(STATES))][::-1]
     for seed, (one, other) in enumerate(zip(first, again, strict=True)):
         for a, b in zip(one, other, strict=True):
@@ -297,6 +298,7 @@ def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vec
     """
     memory, k = law.start(x, target, usual_vessel()), bundle(law.constants_with(usual_vessel()))
     memory = memory + random.normal(0.0, 0.1, len(memory))
+    # NaN in every place, so that one that is left unwritten is no finite number in the end.
     demands = len(DEMAND) + law.asks_sway()
     outputs = [np.full(size, np.nan) for size in (demands, len(memory), len(law.signals))]
     if law.takes_samples():

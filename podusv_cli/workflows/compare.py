@@ -178,6 +178,7 @@ def compare_gathered(
         _add_report(writer, result, given.name, origin, extras, progress, request)
         folder = writer.finish(missing=lost)
         made = {run.label for run in result.runs}
+        # A log was measured, so no step of its own has to converge.
         runs = [m for m in given.members if m.label in made and not m.track]
         unverified = tuple(m.label for m in runs if not is_verified(m.resolved))
         return Compared(folder, result, writer.status, tuple(extras.missing), doubted, unverified)
@@ -351,6 +352,7 @@ def _with_departures(runs: Sequence[PastRun], members: Sequence[Member]) -> list
     Only simulated runs have these distances.
     """
     measured = {m.label: m.track for m in members if m.track}
+    # There is one track at most; without it the list is empty, and the runs stay as they are.
     return [
         replace(run, cost={**run.cost, **track.departures(run.counted_recording)})
         if run.label not in measured

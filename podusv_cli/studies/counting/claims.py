@@ -277,6 +277,7 @@ def _verdict(parsed: ParsedStudyClaim, tried: _Evaluation) -> StudyVerdict:
     """
     runs, answers = tried.runs, tried.answers
     broken = sum(int(np.sum(runs.broken(law) & runs.done(law))) for law in parsed.parsed.laws)
+    # The samples that are there count the broken runs' draws.
     others = replace(tried, whole=False, samples={}) if broken else tried
     return StudyVerdict(
         name=parsed.name,

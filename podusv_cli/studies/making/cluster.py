@@ -194,12 +194,14 @@ class Cluster:
         self._look()
         # None: every worker, also one that joins later.
         allowed = frozenset(self._threads) - frozenset(self._refused) if self._refused else None
+        # Where all are refused, units wait: a worker that fits may still join.
         while allowed != frozenset() and self._has_room() and (task := self._next(units)):
             self._submit(replace(task, allowed=allowed))
         return bool(self._running or self._again or self._suspects)
 
     def _has_room(self) -> bool:
         alone = any(task.alone for task in self._running.values())
+        # Without a worker one unit waits at the scheduler, so that one that joins has work at once.
         return not alone and len(self._running) < max(1, WINDOW * sum(self._threads.values()))
 
     def _next(self, units: Units) -> UnitTask | None:
@@ -289,6 +291,7 @@ class Cluster:
         elif reply.outcome.killed and not task.alone:
             self._suspects.append(replace(task, alone=True))
         else:
+            # No worker has signed it: the unit, alone, ended its worker, or Dask failed.
             if reply.worker:
                 self._machines[reply.worker] = reply.machine
                 self._made.setdefault(reply.worker, []).append(task)
@@ -302,6 +305,7 @@ class Cluster:
             return
         self._looked = time.monotonic()
         try:
+            # All of them: by default newer versions of Dask tell of five.
             workers = self._client.scheduler_info(n_workers=-1)["workers"]
         except LOST as error:
             raise lost_scheduler(error) from error

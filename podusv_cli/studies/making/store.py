@@ -131,6 +131,7 @@ class Store:
         meanwhile, which are left alone. Raises StorageError.
         """
         earlier, units, causes = [*self._earlier()], list[Path](), dict[RunKey, str]()
+        # For the causes alone; each is read again when it is written, so that few are in memory.
         for path in self._units():
             if result := read(path, self.seal):
                 units.append(path)
@@ -142,6 +143,7 @@ class Store:
             causes |= table.causes
         path = self.folder / RUNS
         runs_writer.write(path, self.about, self.seal, causes, self._these(earlier, units))
+        # Read back and checked, before the only other copy is removed.
         runs = self.runs()
         if all(runs.tried(law).all() for law in self.about.laws):
             with files.storage_errors(f"cannot remove the files in {self.folder / UNITS}"):

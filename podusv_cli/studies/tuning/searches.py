@@ -152,6 +152,7 @@ def _sample_reached(
     (SAMPLES, 1, sets) those of training sets. Shape (SAMPLES,).
     """
     by_search = np.stack([np.median(runs[met], axis=1) for runs in table], axis=1)
+    # A law that was not searched has no searches to draw, whatever the training sets are.
     if len(table) == 1:
         return by_search[:, 0]
     sets = trained.shape[-1]
