@@ -74,6 +74,7 @@ def _show_metrics(difference: RunDifference) -> None:
     from podusv_cli.metrics.table import metrics_with
     from podusv_cli.metrics.windows import find
 
+    # Of installed packages alone: what lies in the folders of finished runs is not executed.
     known = metrics_with(installed_plugins())
     units = {name: metric.unit for name in difference.metrics if (metric := find(name, known))}
     rows = [

@@ -89,6 +89,7 @@ def report_error(error: BaseException, package: str = "podusv") -> int:
     if isinstance(error, KeyboardInterrupt):
         _print_error(str(error) or "interrupted")
         return INTERRUPTED
+    # Before OSError, of which it is one: that `head` has read enough is no failure.
     if isinstance(error, BrokenPipeError):
         _discard_output(sys.stdout)
         return PIPE_CLOSED

@@ -126,6 +126,7 @@ class Evaluation(Walk):
 
         `left` and `right` are the nodes of the numbers, for a sentence on why it is unknown.
         """
+        # Neither event ever happens, so neither of the two times is before the other.
         never = a == b == math.inf
         if math.isnan(a) or math.isnan(b):
             return Condition.of([None])

@@ -143,6 +143,7 @@ class Page(Figure):
         if not panels:
             return
         for axis in (axis for axes in panels for axis in (axes.xaxis, axes.yaxis)):
+            # Of matplotlib's own kinds alone: a formatter that a figure has set stays.
             if plain := PLAIN.get(type(axis.get_major_formatter())):
                 axis.set_major_formatter(plain())
             if plain := PLAIN.get(type(axis.get_minor_formatter())):

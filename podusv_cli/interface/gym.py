@@ -193,6 +193,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         Arguments are described at the class. Raises UsageError where runs cannot march side by
         side.
         """
+        # Gymnasium's own vectors take a number second; here it would be taken for changes.
         if whole(changes) >= 0:
             raise UsageError(f"podusv.gym: {changes} stands for `changes`; write count={changes}")
         if (number := whole(count)) < 1:
@@ -244,6 +245,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
             self._check_actions(actions).T,
             [march for march in self._marches if march.over],
         )
+        # Before anything moves: the arrays of which it is made are written in place.
         before = self._moment() if self._task.own else None
         self._marches = [march for march in self._marches if not march.over]
         dead, cut = np.zeros((2, self.num_envs), bool)

@@ -146,6 +146,7 @@ def _check_ends(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns)
     grid = scenario.time_grid()
     for key, column in numbers.items() if loops else ():
         first = Plan(loops[0], grid).structure
+        # Only the ends: a plan for each of thousands of values would take longer than some batches.
         for row in sorted({int(np.argmin(column)), int(np.argmax(column))} - {0}):
             other = first
             with suppress(PodusvError):

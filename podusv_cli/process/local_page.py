@@ -76,6 +76,7 @@ class _Handler(BaseHTTPRequestHandler):
         """
         if not self._is_known() or (size := self._size()) is None:
             return
+        # A form elsewhere can send text; for JSON a browser asks leave first, and gets none.
         kind, origin = self.headers.get("Content-Type"), self.headers.get("Origin")
         if kind != "application/json" or (origin and origin[7:] not in self.server.hosts):
             self._refuse(403, "only the page itself may ask, in JSON")

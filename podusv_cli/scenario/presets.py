@@ -186,6 +186,7 @@ def _nominal(root: Node, plugins: Plugins, faults: list[Fault]) -> Node:
     if "preset" in given.content:
         return root.with_entry("nominal", _from_preset(given, "nominal", plugins, faults))
     whole = _with_source(merge(vessel, given), plugins)
+    # The vessel has a message for that; its copy is not to have a second one.
     lost = not isinstance(vessel.content, dict)
     return root.with_entry("nominal", replace(whole, faulty=whole.faulty or lost))
 

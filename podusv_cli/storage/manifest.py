@@ -69,6 +69,7 @@ def parse_manifest(text: str, folder: Path) -> Manifest:
     """As `read`, of the text of the folder's manifest."""
     path = folder / NAME
     content = json_files.parse_json(text, path)
+    # Before the keys are checked: those of another format are no damage.
     if misfit := other_format(content.get("podusv_format")):
         raise StorageError(f"{path}: {misfit}")
     try:

@@ -39,6 +39,7 @@ class Staging:
                 final.parent.mkdir(parents=True, exist_ok=True)
                 self._box.mkdir()
                 self.folder.mkdir()
+        # An interrupt, too, must leave nothing behind.
         except BaseException:
             self.discard()
             raise

@@ -197,6 +197,7 @@ def _check_metrics(request: Request, members: Sequence[Member]) -> None:
 
 def _keep_apart(items: Sequence[Path], target: Path) -> None:
     """Raise UsageError where writing the comparison would touch a run that it compares."""
+    # Real paths, as one of them may lead through a link into the other.
     there = Path(os.path.realpath(target))
     for item in items:
         here = Path(os.path.realpath(item))

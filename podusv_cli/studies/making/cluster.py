@@ -84,6 +84,7 @@ def _client(address: str) -> Iterator[Any]:
         raise UsageError("--scheduler needs Dask: pip install 'podusv[cluster]'") from None
     with _silent_talkers():
         try:
+            # Not the default: what else uses Dask in this process keeps the client that it has.
             client = Client(address, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError) as error:
             raise StorageError(

@@ -211,6 +211,7 @@ class Store:
         }
         for earlier in self._earlier():
             for (law, cell), mask in there.items():
+                # The table has fewer draws where more are asked for now.
                 mask[: earlier.wanted] = earlier.tried(law)[cell]
         for path in self._units():
             if result := read(path, self.seal):
