@@ -10,7 +10,9 @@ from podusv_cli.core.about import BESIDE_RUNS
 from podusv_cli.core.phrases import value_text
 from podusv_cli.pages.page import flat
 
+# Ends of keys with words about numbers, which two runs may have the same of.
 PROSE = (".source", ".validity")
+# What runs of one task may differ in: words, and the laws that are compared.
 IGNORED = ("name", "description", "controller", "controllers", "claims", "silence", *BESIDE_RUNS)
 
 

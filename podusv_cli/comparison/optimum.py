@@ -12,6 +12,7 @@ from podusv_cli.metrics.distance import OF_OPTIMUM
 from podusv_cli.pages.page import flat
 from podusv_cli.process.extras import Extras, Failure
 
+# What an optimum depends on: law, sensors and sampling have no part in it.
 TASK = ("vessel", "start", "path", "disturbance", "actuator")
 
 

@@ -29,6 +29,7 @@ from podusv_cli.scenario.shipped import PREFIX, file_of, names
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted_key
 
 MAX_BYTES = 1_000_000
+# Reading goes down by recursion, and must not come to the end of Python's stack.
 MAX_DEPTH = 32
 MAX_NODES = 20_000
 ENDINGS = (".yaml", ".yml")

@@ -31,6 +31,7 @@ from podusv_cli.storage.staging import Staging, Taken, remove_abandoned
 LOG, ABOUT, THEORY, MISSING = "log.h5", "about.json", "theory.json", "missing.json"
 RESOLVED, PROVENANCE = "resolved.yaml", "provenance.json"
 STUDY, LOGS = "study.json", "logs"  # in the folder of a study
+# Only laws with V have theory.json, and an older podusv wrote no about.json.
 NEEDED = (LOG, "metrics.json", PROVENANCE, RESOLVED)
 
 

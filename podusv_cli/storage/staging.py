@@ -18,6 +18,7 @@ from podusv_cli.core.system import rename_folder
 from podusv_cli.process.temporary_names import find_abandoned, temporary_name
 from podusv_cli.storage import files
 
+# What systems answer where the name is that of a folder with files, or of a file.
 _TAKEN = (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR)
 # Nothing to exchange with, or no exchange on this system or file system.
 _NO_EXCHANGE = (errno.ENOENT, errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)
