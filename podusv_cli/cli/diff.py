@@ -123,6 +123,7 @@ def size(d: Deviation) -> str:
     """
     if math.isinf(d.gap):
         return "one is not finite"
+    # 0.0 and -0.0 differ in one bit, and in no number.
     if d.ulps == 0:
         return "the sign of zero"
     if d.ulps is not None and d.ulps <= COUNTABLE:

@@ -221,6 +221,7 @@ class Evaluation(Walk):
         name = known_name(function(node), [*REDUCERS, *OPERATIONS, "rate"], "function")
         if name in REDUCERS:
             return self._or_doubt(lambda: self._reduce(name, node))
+        # `rate` is not among them: it takes a curve with its times, never numbers.
         count, operation = OPERATIONS.get(name, (1, None))
         if len(node.args) != count:
             refuse(node, f"{name} takes {count} argument(s)")

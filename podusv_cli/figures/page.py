@@ -68,6 +68,7 @@ class Page(Figure):
         """
         self.set_size_inches(width, height)
         keys, self.keys = self.keys, []
+        # A copy, as removing changes the list.
         for legend in list(self.legends):
             legend.remove()
         for handles, names, below in keys:

@@ -230,6 +230,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         `seed` is the first of as many numbers of draws, or one for each. `options` change nothing.
         """
         seeds = self._seeds(seed)
+        # The base class has one generator for all environments.
         super().reset(seed=seeds[0])
         self._marches = self._begin_runs(range(self.num_envs), seeds)
         return self._observe()

@@ -53,6 +53,7 @@ def _column(key: str, given: Any) -> list[Any]:
 
     Raises ParameterError for anything else.
     """
+    # As objects: numpy would give numbers and words of one list the same type.
     array = np.asarray(given, object)
     if array.ndim != 1:
         what = f"an array of shape {array.shape}" if array.ndim else f"{given!r:.60}"

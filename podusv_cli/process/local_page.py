@@ -105,6 +105,7 @@ class _Handler(BaseHTTPRequestHandler):
     def _size(self) -> int | None:
         """The bytes of a question; None, and it is refused, where that is no number or too many."""
         text = self.headers.get("Content-Length", "")
+        # int() takes signs, underscores and digits of other scripts, too.
         if not re.fullmatch("[0-9]{1,18}", text):
             self._refuse(400, "Content-Length must be the bytes of a question")
         elif int(text) > MOST:

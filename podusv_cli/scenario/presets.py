@@ -225,6 +225,7 @@ def _with_source(vessel: Node, plugins: Plugins) -> Node:
     known = name in preset_names(VESSELS, plugins)
     base = preset_values(VESSELS, name, [], plugins) if known else None
     stem = str(base.get("source")).removesuffix(".") if base else ""
+    # A source in the scenario's own words stays as it is.
     if not base or not source or not str(source.content).startswith(stem):
         return vessel
     fields = Vessel.model_fields.items()

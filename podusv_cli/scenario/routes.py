@@ -71,6 +71,7 @@ def route_of(text: str) -> RouteFile | None:
                 return without_repeats(read(begin))
             except RecursionError as error:
                 raise RouteFault("has brackets in brackets without end") from error
+    # A behaviour of MOOS-IvP may begin with anything, so its points are searched for.
     return without_repeats(_moos(begin)) if POINTS.search(begin) else None
 
 

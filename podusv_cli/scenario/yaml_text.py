@@ -355,6 +355,7 @@ class _Reader:
         entries: dict[str, Node] = {}
         while not isinstance(head := self._next(), yaml.MappingEndEvent):
             key = self._key(head, route, _decimal_comma(head, entries))
+            # Read before its key is judged, as its events have to be gone in any case.
             entry = self._node(self._next(), (*route, key or "?"))
             if key in entries:
                 first = entries[key].key_mark

@@ -196,6 +196,7 @@ def open_archive(path: Path) -> Iterator[Archive]:
     with files.open_regular(path) as file:
         try:
             archive = zipfile.ZipFile(file)
+        # NotImplementedError says that the archive is of a later version of zip.
         except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
             text = f"{path} is no archive of podusv pack, or not all of one ({error})"
             raise StorageError(text) from error

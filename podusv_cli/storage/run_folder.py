@@ -155,6 +155,7 @@ class RunWriter:
 
         Another process may take a number meanwhile, so each is tried.
         """
+        # Without the first, which is the name that was taken.
         for path in islice(_numbered_folders(self.final), 1, None):
             with suppress(Taken):
                 _check_replaceable(path, force=False)

@@ -98,6 +98,7 @@ def _check_plain(folder: Path) -> None:
     Through a link podusv would write elsewhere; what goes meanwhile is another process's.
     """
     for path in map(folder.joinpath, names_inside(folder)):
+        # What is gone since it was listed leads nowhere.
         with storage_errors(f"cannot read {path}"), suppress(FileNotFoundError):
             mode = path.lstat().st_mode
             if not stat.S_ISREG(mode):

@@ -242,6 +242,7 @@ def loop_with(component: Component) -> ClosedLoop:
         "disturbance": Calm(),
         "actuator": Ideal(),
         "controller": Pid(),
+        # Where the true state is seen, there is nothing to estimate.
         "measurement": Sensors() if isinstance(component, Estimator) else Exact(),
     }
     place = next(name for name, base in ROOMS.values() if isinstance(component, base))

@@ -228,6 +228,7 @@ def _check_not_finished(out: Path, names: Iterable[str]) -> None:
 
     The folder may be `out` or one around it.
     """
+    # Where links lead to, as that is where files are written.
     place = Path(os.path.realpath(out))
     for folder in (place, *place.parents):
         listed = _list_folder(folder)

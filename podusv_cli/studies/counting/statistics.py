@@ -92,6 +92,7 @@ def digits(number: float, form: str = ".5g", infinite: str = "failed") -> str:
         return "-"
     if np.isinf(number):
         return infinite if number > 0.0 else "no limit"
+    # -0.0 would have its sign.
     return f"{number:{form}}" if number else "0"
 
 
