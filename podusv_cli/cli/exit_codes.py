@@ -18,6 +18,7 @@ from podusv_cli.core.errors import PodusvError, StorageError
 from podusv_cli.process.interrupts import SIGNALLED, STDERR, Interrupts, interrupts_caught
 
 Given = ParamSpec("Given")
+# What a shell reports for a program that SIGINT ended.
 INTERRUPTED = 130
 PIPE_CLOSED = 141  # what a shell reports for a program that SIGPIPE ended
 BUG = 1

@@ -127,6 +127,7 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
         `seed` is the number of a draw, see the class. `options` change nothing.
         """
         seed = None if seed is None else self._task.seed(seed)
+        # It seeds the generator that draws without a number come from.
         super().reset(seed=seed)
         scenario = self._task.draw_scenario(seed, self.np_random)
         self._session = session = Session(scenario, self._task.period, scenario.plan(), self._march)
@@ -145,6 +146,7 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
             raise UsageError("podusv.gym: the episode is over; call reset")
         after, before = session.step(action), self._now
         dead, cut = after.status == "diverged", after.status == "finished"
+        # No number of a terminated run is sure to be finite: the moment before it stands.
         self._now = before if dead else task.moment_of(session, numbers(action))
         reward = (
             float(task.reward_gained(before, self._now))

@@ -81,6 +81,7 @@ def write_all(contents: Mapping[Path, bytes]) -> None:
             with storage_errors(f"cannot write {path} ({len(contents[path])} bytes)"):
                 os.replace(part, path)
     finally:
+        # Those that were renamed are not there any more.
         for part in parts.values():
             with suppress(OSError):
                 part.unlink()

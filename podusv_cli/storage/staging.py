@@ -89,6 +89,7 @@ class Staging:
         fails.
         """
         if not self._exchange():
+            # Another process may have moved the old one away.
             with suppress(FileNotFoundError):
                 rename_folder(self.final, _old(self._box))
             self._rename()

@@ -66,6 +66,7 @@ class Parsed:
     @cached_property
     def statistics(self) -> int:
         """How many different statistics the claim has."""
+        # As long as it is parsed, the claim has none.
         return len({link.text for link in self.links}) or 1
 
 

@@ -242,6 +242,7 @@ def draws_for_share(estimate: float, bound: float, level: float) -> int | None:
     # A difference of rounding alone, such as 0.95 of 1 - 0.05.
     if estimate - bound <= 1e-12:
         return None
+    # More draws of the same share decide more, so halving finds the first count.
     count = 1 + bisect_left(range(1, MOST + 1), True, key=decides)
     return count if count <= MOST else None
 

@@ -246,6 +246,7 @@ class Cluster:
             astuple(task.unit),
             digest(self._ours),
             astuple(task.variant) if task.variant else None,
+            # Else Dask would take a unit that is tried again for one that it has made already.
             pure=False,
             workers=sorted(task.allowed) if task.allowed else None,
         )
@@ -258,6 +259,7 @@ class Cluster:
             future = self._finished.get(timeout=LOOK)
         except Empty:
             return None, None
+        # A future that was taken back comes here, too, and is no longer under way.
         return future, self._reply(future) if future in self._running else None
 
     def _reply(self, future: Any) -> Reply:

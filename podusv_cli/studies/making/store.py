@@ -110,6 +110,7 @@ class Store:
     def write(self, result: UnitResult) -> None:
         """Keep the result of a unit. Raises StorageError."""
         unit = result.unit
+        # With its count, since half of a unit begins at the same draw.
         name = f"{unit.law}-{unit.cell}-{unit.first}-{unit.count}.unit"
         files.write_bytes(self.folder / UNITS / name, encode_unit(result, self.seal))
 
