@@ -305,6 +305,7 @@ class _Pool:
                 message = pipe.recv()
             except (EOFError, OSError, UnpicklingError):  # killed, perhaps within a message
                 message = None
+                # The pipe closes a moment before the process has ended.
                 process.join()
             if isinstance(message, float):
                 self._progress(number, message)

@@ -169,6 +169,7 @@ def compare_gathered(
             from podusv_cli.doubt.outputs import HEAD, row
             from podusv_cli.workflows.doubt import doubt_of
 
+            # Within a folder that is new, `force` can replace nothing of the user's.
             own = replace(request, out=writer.folder / "doubt", force=True)
             doubted = doubt_of(loaded, own, progress)
             result = replace(result, doubts=[HEAD, *map(row, doubted.answers)])
