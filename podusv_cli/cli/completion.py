@@ -45,6 +45,7 @@ def complete_from_cache(
 
         folder, state = _folder(), _state()
         place = folder and folder / f"{known.__name__}.json"
+        # Where nothing was kept, or nothing that can be read, the words are made below.
         with suppress(OSError, ValueError, KeyError):
             there = json.loads(place.read_text("utf-8")) if place else {}
             if there["state"] == state:

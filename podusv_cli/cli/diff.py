@@ -74,6 +74,7 @@ def _show_metrics(difference: RunDifference) -> None:
     from podusv_cli.metrics.table import metrics_with
     from podusv_cli.metrics.windows import find
 
+    # Of installed packages alone: what lies in the folders of finished runs is not executed.
     known = metrics_with(installed_plugins())
     units = {name: metric.unit for name in difference.metrics if (metric := find(name, known))}
     rows = [
@@ -122,6 +123,7 @@ def size(d: Deviation) -> str:
     """
     if math.isinf(d.gap):
         return "one is not finite"
+    # 0.0 and -0.0 differ in one bit, and in no number.
     if d.ulps == 0:
         return "the sign of zero"
     if d.ulps is not None and d.ulps <= COUNTABLE:

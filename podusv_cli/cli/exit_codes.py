@@ -18,6 +18,7 @@ from podusv_cli.core.errors import PodusvError, StorageError
 from podusv_cli.process.interrupts import SIGNALLED, STDERR, Interrupts, interrupts_caught
 
 Given = ParamSpec("Given")
+# What a shell reports for a program that SIGINT ended.
 INTERRUPTED = 130
 PIPE_CLOSED = 141  # what a shell reports for a program that SIGPIPE ended
 BUG = 1
@@ -89,6 +90,7 @@ def report_error(error: BaseException, package: str = "podusv") -> int:
     if isinstance(error, KeyboardInterrupt):
         _print_error(str(error) or "interrupted")
         return INTERRUPTED
+    # Before OSError, of which it is one: that `head` has read enough is no failure.
     if isinstance(error, BrokenPipeError):
         _discard_output(sys.stdout)
         return PIPE_CLOSED

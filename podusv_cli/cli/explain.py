@@ -58,6 +58,7 @@ def explain(
     else:
         try:
             explained = rows(key, (*findings, *metrics), plugins)
+        # Figures come last, as matplotlib is slow to import.
         except UnknownKeyError:
             if not _echo_figure(key, plugins):
                 raise

@@ -103,6 +103,7 @@ def identify(
         return _show_columns(list_log(columns, config, request), as_json)
     if look:
         return _show_page(look_at(look, config, request), as_json=as_json, quiet=quiet)
+    # Optional only for the sake of --columns and --look.
     if not config:
         raise typer.BadParameter("CONFIG is missing: a scenario with the section `identify`")
     from podusv_cli.cli.progress import progress_bars

@@ -38,6 +38,7 @@ def load_command(name: str) -> Any:
         if not isinstance(function, FunctionType):
             raise TypeError(f"it is a {type(function).__name__}, and a command is a function")
         return _command_of(name, function)
+    # A module that ends the process as it is imported must not end the help with it.
     except (Exception, SystemExit) as error:
         why = f"podusv {name}: {point.value} is no command: {in_a_line(error)}"
         return _command_of(name, _refusing(why), takes_anything=True)

@@ -147,6 +147,7 @@ def _rows(label: str, law: LoopMargins) -> list[list[str]]:
         crossed = ", ".join(f"{omega:.4g}" for omega in loop.crossovers) or "-"
         phase = f"{loop.phase_margin:.4g} ({math.degrees(loop.phase_margin):.1f} deg)"
         known = phase if math.isfinite(loop.phase_margin) else _format_margin(loop.phase_margin)
+        # The phase is the first of them, and printed in degrees as well.
         numbers = [_format_margin(getattr(loop, name)) for name in NUMBERS[1:]]
         rows.append([label, f"{axis} load", crossed, known, *numbers])
     every = "both" if len(law.loops) == 2 else "all"

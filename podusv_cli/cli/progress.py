@@ -72,6 +72,7 @@ def progress_bars(*, wanted: bool) -> Iterator[Bars | None]:
                 bars.refresh()
 
         def advance(name: str, fraction: float, patience: float = PATIENCE) -> None:
+            # A terminal that is lost costs the bar only.
             with suppress(OSError):
                 draw(name, fraction, patience)
 

@@ -90,6 +90,7 @@ def run(
         try:
             done = workflow.run(Path(config), request, line.tell)
         except KeyboardInterrupt as stop:
+            # An interrupt before the first run has no words of its own.
             again = f"the same command{' without --force' if force else ''} goes on"
             raise KeyboardInterrupt(str(stop) or f"interrupted; {again}") from None
     for refused in done.refused:

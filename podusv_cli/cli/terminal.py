@@ -98,6 +98,7 @@ def echo_entry(name: str, *lines: str, facts: str = "") -> None:
         )
 
     head = wrap_indented(f"{name}  {facts}".rstrip(), "")
+    # Made bold after it is wrapped: the codes for it would count as letters.
     typer.echo(
         head.replace(name, typer.style(name, bold=True), 1)
         if supports_colours(sys.stdout)

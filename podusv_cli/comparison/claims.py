@@ -120,6 +120,7 @@ def _verdict(
         unknown = f"whether the premise holds is unknown: {doubts}"
         reason = unknown if given is None else f"the premise does not hold: {parsed.claim.given}"
         return RunsVerdict(parsed.name, parsed.claim, None, evaluation.numbers, reason)
+    # Anew: numbers and doubts of the premise are no evidence of what follows from it.
     evaluation = Evaluation(runs, parsed.claim.tolerance, metrics)
     answer = evaluation.holds(parsed.expect)
     reason = "; ".join(dict.fromkeys(evaluation.doubts)) if answer is None else ""

@@ -98,6 +98,7 @@ def pointwise(operation: Callable[..., Any], parts: Sequence[Quantity]) -> Quant
     """
     curves = [part for part in parts if isinstance(part, Curve)]
     times = common_times(curves)
+    # numpy divides by 0 without an exception, which Python's own floats raise.
     plain = [part.at(times) if isinstance(part, Curve) else np.float64(part) for part in parts]
     result = operation(*plain)
     runs = {label: run for curve in curves for label, run in curve.runs.items()}

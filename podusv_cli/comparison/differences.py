@@ -10,7 +10,9 @@ from podusv_cli.core.about import BESIDE_RUNS
 from podusv_cli.core.phrases import value_text
 from podusv_cli.pages.page import flat
 
+# Ends of keys with words about numbers, which two runs may have the same of.
 PROSE = (".source", ".validity")
+# What runs of one task may differ in: words, and the laws that are compared.
 IGNORED = ("name", "description", "controller", "controllers", "claims", "silence", *BESIDE_RUNS)
 
 
@@ -34,6 +36,7 @@ def differences(
     sections = list(dict.fromkeys(map(_section, keys)))
     wanted = (key for key in keys if not key.endswith(prose))
     ordered = sorted(wanted, key=lambda key: sections.index(_section(key)))
+    # Compared as texts below, since lists and dicts cannot be in a set.
     by_key = {key: {label: v.get(key) for label, v in flattened.items()} for key in ordered}
     return {
         key: values for key, values in by_key.items() if len({repr(v) for v in values.values()}) > 1

@@ -69,6 +69,7 @@ class _ExampleRun:
 
     signals: Mapping[str, Signal]
     metrics: Mapping[str, MetricAbout]
+    # No window that a claim names lies beyond its end.
     until = math.inf
     every = 1
     ending = ""
@@ -95,6 +96,7 @@ class _ExampleRun:
             )
         usable = [s.name for s in self.signals.values() if not (s.fixed or s.axes)]
         known_name(name, [*usable, *self.metrics], "signal or metric")
+        # Two that grow: they serve as times, too, and a rate can be taken of them.
         return np.array([0.0, 1.0])
 
 
@@ -124,6 +126,7 @@ class Evaluation(Walk):
 
         `left` and `right` are the nodes of the numbers, for a sentence on why it is unknown.
         """
+        # Neither event ever happens, so neither of the two times is before the other.
         never = a == b == math.inf
         if math.isnan(a) or math.isnan(b):
             return Condition.of([None])
@@ -218,6 +221,7 @@ class Evaluation(Walk):
         name = known_name(function(node), [*REDUCERS, *OPERATIONS, "rate"], "function")
         if name in REDUCERS:
             return self._or_doubt(lambda: self._reduce(name, node))
+        # `rate` is not among them: it takes a curve with its times, never numbers.
         count, operation = OPERATIONS.get(name, (1, None))
         if len(node.args) != count:
             refuse(node, f"{name} takes {count} argument(s)")

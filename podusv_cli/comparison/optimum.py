@@ -12,6 +12,7 @@ from podusv_cli.metrics.distance import OF_OPTIMUM
 from podusv_cli.pages.page import flat
 from podusv_cli.process.extras import Extras, Failure
 
+# What an optimum depends on: law, sensors and sampling have no part in it.
 TASK = ("vessel", "start", "path", "disturbance", "actuator")
 
 
@@ -26,6 +27,7 @@ def with_optimum_ratios(runs: Sequence[PastRun], extras: Extras) -> list[PastRun
         for i, run in enumerate(related_runs):
             same = [other for other in optima if not any(_other(run, other))]
             if same:
+                # Each optimum is a local one, so the best of them counts.
                 least = min(other.metric(metric) for other in same)
                 cost = {**run.cost, ratio.name: run.metric(metric) / least}
                 related_runs[i] = replace(run, cost=cost)

@@ -24,6 +24,7 @@ def parse_claims(loaded: Loaded) -> list[ParsedClaim]:
         for field, text in (("expect", claim.expect), ("given", claim.given)):
             key = f"claims.{name}.{field}"
             try:
+                # An empty `expect` is parsed, too, and refused with the others.
                 if text or field == "expect":
                     trees[field] = parse(text, scenario.labels(), signals, metrics)
             except ExpressionError as error:

@@ -94,6 +94,7 @@ def difference(one: RunFolder, other: RunFolder) -> RunDifference:
         for run in (one, other)
     ]
     given = dict.fromkeys((*one.metrics, *other.metrics))
+    # Metrics that only a plug-in or an older podusv knows come last.
     names = sorted(given, key=lambda name: [*METRICS, *given].index(name))
     return RunDifference(
         log=compare(one.recording, other.recording) if whole else None,

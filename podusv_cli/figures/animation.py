@@ -22,6 +22,7 @@ from podusv_cli.figures.tracks import bounds, targets
 from podusv_cli.figures.trajectory import enlargement, hull_of, map_axes
 
 GIF, MP4 = "animation.gif", "animation.mp4"
+# About ten seconds in all, however long the run is.
 FRAMES = 120
 FRAME_MS = 80
 SIZE = 7.0, 4.0  # inches

@@ -54,6 +54,7 @@ def controls(runs: Sequence[Shown], columns: int) -> Figure:
             _draw_claimed_peak(axes, runs, loads[load][1])
         if columns == 1 or part == 0:
             axes.set_ylabel(axis_label(runs, loads[load][kind]))
+    # The lowest panels, under which the labels of the time axis stand.
     for axes in cells[-1, -1] if columns == 2 else cells[:, -1, -1]:
         axes.set_xlabel(TIME)
     legend(figure)

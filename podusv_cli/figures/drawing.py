@@ -93,6 +93,7 @@ def draw_in_parallel(
 
     def job(sheet: Sheet, tell: Progress) -> tuple[dict[str, bytes], list[Failure]]:
         """Draw one sheet in a process of its own: its files by name, and what failed."""
+        # Of this process: what the other one notes comes back with the result.
         own = Extras()
         with interrupts_enabled():
             drawn = partial(draw, runs, [sheet], formats, look)

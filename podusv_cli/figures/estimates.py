@@ -88,6 +88,7 @@ def _small_multiples(runs: Sequence[Shown], columns: int) -> Figure:
             # A panel is too low for the label in one line.
             axes.set_ylabel("" if column else _error_label(state).replace(" $", "\n$"))
         axes.set_xlabel(TIME)
+        # The highest panel of this column: the first of those that were just added.
         axes.figure.axes[-len(STATE)].set_title(shorten(run.name, longest), loc="left")
     legend(figure)
     return figure

@@ -57,4 +57,5 @@ def _spells(t: Vector, on: Vector) -> Iterator[tuple[float, float]]:
     """Start and length [s] of every stretch of rows in which `on` (n,) is 1; `t` (n,) [s]."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0.0], on > 0.5, [0.0]])))
     for first, after in edges.reshape(-1, 2):
+        # A spell that lasts to the end has no row after it.
         yield float(t[first]), float(t[min(after, len(t) - 1)] - t[first])

@@ -68,6 +68,7 @@ class Page(Figure):
         """
         self.set_size_inches(width, height)
         keys, self.keys = self.keys, []
+        # A copy, as removing changes the list.
         for legend in list(self.legends):
             legend.remove()
         for handles, names, below in keys:
@@ -143,6 +144,7 @@ class Page(Figure):
         if not panels:
             return
         for axis in (axis for axes in panels for axis in (axes.xaxis, axes.yaxis)):
+            # Of matplotlib's own kinds alone: a formatter that a figure has set stays.
             if plain := PLAIN.get(type(axis.get_major_formatter())):
                 axis.set_major_formatter(plain())
             if plain := PLAIN.get(type(axis.get_minor_formatter())):

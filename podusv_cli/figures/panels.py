@@ -77,6 +77,7 @@ def grid(count: int, columns: int) -> tuple[Page, list[Axes]]:
         row, column = divmod(place, columns)
         cell = cells[row, :] if alone and place == count - 1 else cells[row, column]
         axes = figure.add_subplot(cell, sharex=panels[0] if panels else None)
+        # The last panel of a row for itself is wider, so those above it need numbers of their own.
         axes.tick_params(labelbottom=row == rows - 1 or (alone and row == rows - 2))
         axes.set_xlabel(TIME if row == rows - 1 else "")
         panels.append(axes)

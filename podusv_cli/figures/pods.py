@@ -54,6 +54,7 @@ def _draw(axes: Axes, run: Shown, names: tuple[str, str], pod: int, *, fitted: b
     `names` are (actual, asked).
     """
     actual, asked = names
+    # Its label begins with _, so the legend leaves it out.
     thin: dict[str, Any] = {**run.line_style, **THIN, "label": f"_{run.name}, {asked}"}
     if _has(run, asked, pod):
         draw_run_curve(axes, run, _curve(run, asked, pod), fitted=fitted, **thin)

@@ -37,6 +37,7 @@ def linear_up_to(runs: Sequence[Shown], name: str, peak: float) -> float | None:
     usual = max(_usual(run, name) for run in kept)
     if any(run.whole for run in kept):
         usual = max(usual, peak * 10.0**-DECADES)
+    # A usual size of 0 has no decade to begin at.
     return float(10.0 ** np.ceil(np.log10(usual))) if peak > TALL * usual > 0.0 else None
 
 

@@ -46,6 +46,7 @@ def render_sketches(
     outcomes = (
         () if extras.interrupted else run_shares([partial(_images, sketch) for sketch in wanted])
     )
+    # After an interrupt there are no outcomes, and nothing is paired.
     for sketch, outcome in zip(wanted, outcomes, strict=bool(outcomes)):
         extras.interrupted |= outcome.interrupted
         if outcome.result:

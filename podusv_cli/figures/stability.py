@@ -138,6 +138,7 @@ def _rate(axes: Axes, runs: Sequence[Shown]) -> None:
         near = np.where(np.abs(limit) <= FAR * largest, limit, np.nan)
         add = axes.add_line if run in kept else axes.add_artist  # which leaves the scale as it is
         add(Line2D(run.recording["time"], near, **_thin(run)))
+    # A size of 0, where no run settled, has no logarithm.
     _compress(axes, max([*(_settled_size(run, "V_dot") for run in kept), 1e-9]))
     axes.axhline(0.0, color="#444444", linewidth=0.5)
     axes.autoscale_view()

@@ -37,6 +37,7 @@ def traces(runs: Sequence[Shown], names: Sequence[str] = ()) -> dict[str, Any]:
         return {}
     return {
         "signals": [_describe_signal(runs, name) for name in shown],
+        # A page begins with one curve at least.
         "first": sum(name in _first(runs) for name in shown) or 1,
         "runs": [
             {

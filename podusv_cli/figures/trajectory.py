@@ -309,6 +309,7 @@ def _is_on_leg(run: Shown, last: float) -> npt.NDArray[np.bool_]:
     begins = [*np.flatnonzero(np.diff(run.signal(LEG))) + 1, len(t)] if run.has(LEG) else []
     for begin, end in pairwise(begins):
         own, size = error[begin:end], np.abs(error[begin:end])
+        # argmax finds the first True. The median counts as near, so there is one on every leg.
         came = int(np.argmax((own * own[0] <= 0.0) | (size <= np.median(size))))
         counts[begin : begin + came] = False
     return counts

@@ -43,6 +43,7 @@ def limit_cycle(scenario: Scenario, log: Recording) -> Sentences:
     at, half = int(np.argmax(power)), len(swing) // 2
     near = slice(max(0, at - SPREAD), at + SPREAD + 1)
     earlier, size = (0.5 * float(np.ptp(part)) for part in (swing[:half], swing[half:]))
+    # The n-th harmonic has n periods in the window.
     pure = at >= PERIODS and power[near].sum() >= PURE * power.sum()
     visible = size >= VISIBLE * scenario.vessel.length
     if pure and visible and size >= DECAY * earlier and not _is_forced(scenario, log, late, near):

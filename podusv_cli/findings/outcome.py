@@ -167,6 +167,7 @@ def inconsistent_filter(scenario: Scenario, log: Recording) -> Sentences:
 )
 def moves_away(scenario: Scenario, log: Recording) -> Sentences:
     """The law does not track: the distance to the target has grown over the run."""
+    # A mean over the window, as a vessel that swings may be far off at the last instant alone.
     late = steady_rows(scenario, log)
     if not late.any():
         return
@@ -214,6 +215,7 @@ def _arrives(errors: Vector, fraction: float, radius: float) -> bool:
 
     `errors` (rows,) [m] are those of the last `fraction` of the run.
     """
+    # Rounded up: the middle one of an odd number counts in both halves.
     half = -(-len(errors) // 2)
     earlier, later = float(errors[:half].mean()), float(errors[-half:].mean())
     # The fall between the middles of both halves, half the window apart, as a rate per run.

@@ -25,6 +25,7 @@ def unkept_module(case: Case) -> Sentences:
             continue
         folder = Path(plugin.path).parent
         for name in dict.fromkeys(_imports_in(plugin.text)):
+            # Loading the plug-in has imported it, so its file is known without a search.
             file = getattr(sys.modules.get(name), "__file__", None)
             if file and _is_beside(Path(file).resolve(), folder):
                 yield (

@@ -70,6 +70,7 @@ def gains_for_another_hull(case: Case) -> Sentences:
     """Speed, moment or pace are not those of this hull with this actuator."""
     law, asked = case.scenario.controller, float(case.reference.speed.max())
     for name, (number, rule, why) in other_numbers(law, case.facts).items():
+        # Less than the hull can do is no fault as long as it suffices for this path.
         if name == "U" and AMPLE * asked <= number < rule:
             continue
         unit = unit_of(type(law).model_fields[name])

@@ -110,6 +110,7 @@ def _chebyshev(count: int) -> Vector:
 def _rk4(matrix: Vector, step: float) -> Vector:
     """The matrix by which one step [s] of RK4 multiplies the state of x' = matrix x; (n, n)."""
     unit, z = np.eye(len(matrix)), step * matrix
+    # Of a linear system, RK4 makes the exponential's series up to z^4.
     return np.asarray(unit + z @ (unit + z @ (unit + z @ (unit + z / 4.0) / 3.0) / 2.0))
 
 

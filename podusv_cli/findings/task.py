@@ -260,6 +260,7 @@ def thrust_short(case: Case) -> Sentences:
 def _driven_ahead(case: Case, row: int) -> Sentences:
     """A sentence where the largest yaw moment, in this row, comes with too much surge force."""
     seen = case.reference
+    # Where no heading can follow, the velocity is unknown and taken as 0.
     x = np.concatenate([np.zeros(3), np.nan_to_num(seen.nu[row])])
     needed, moment, *_ = seen.demand[row].tolist()
     got = float(case.scenario.actuator.settled(x, seen.demand[row])[0])

@@ -160,6 +160,7 @@ def _start(case: Case) -> Sentences:
     start, path, length = case.scenario.start, case.scenario.path, case.scenario.vessel.length
     if not case.scenario.controller.aims():
         return
+    # A path that is followed has no target at t = 0, so its nearest waypoint counts.
     places = path.waypoints() if path.follows else path.targets((0.0,))[:, :2].tolist()
     north, east = min(
         ((start.x - x, start.y - y) for x, y in places), key=lambda off: math.hypot(*off)

@@ -127,6 +127,7 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
         `seed` is the number of a draw, see the class. `options` change nothing.
         """
         seed = None if seed is None else self._task.seed(seed)
+        # It seeds the generator that draws without a number come from.
         super().reset(seed=seed)
         scenario = self._task.draw_scenario(seed, self.np_random)
         self._session = session = Session(scenario, self._task.period, scenario.plan(), self._march)
@@ -145,6 +146,7 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
             raise UsageError("podusv.gym: the episode is over; call reset")
         after, before = session.step(action), self._now
         dead, cut = after.status == "diverged", after.status == "finished"
+        # No number of a terminated run is sure to be finite: the moment before it stands.
         self._now = before if dead else task.moment_of(session, numbers(action))
         reward = (
             float(task.reward_gained(before, self._now))
@@ -193,6 +195,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         Arguments are described at the class. Raises UsageError where runs cannot march side by
         side.
         """
+        # Gymnasium's own vectors take a number second; here it would be taken for changes.
         if whole(changes) >= 0:
             raise UsageError(f"podusv.gym: {changes} stands for `changes`; write count={changes}")
         if (number := whole(count)) < 1:
@@ -229,6 +232,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         `seed` is the first of as many numbers of draws, or one for each. `options` change nothing.
         """
         seeds = self._seeds(seed)
+        # The base class has one generator for all environments.
         super().reset(seed=seeds[0])
         self._marches = self._begin_runs(range(self.num_envs), seeds)
         return self._observe()
@@ -244,6 +248,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
             self._check_actions(actions).T,
             [march for march in self._marches if march.over],
         )
+        # Before anything moves: the arrays of which it is made are written in place.
         before = self._moment() if self._task.own else None
         self._marches = [march for march in self._marches if not march.over]
         dead, cut = np.zeros((2, self.num_envs), bool)

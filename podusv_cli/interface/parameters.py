@@ -53,6 +53,7 @@ def _column(key: str, given: Any) -> list[Any]:
 
     Raises ParameterError for anything else.
     """
+    # As objects: numpy would give numbers and words of one list the same type.
     array = np.asarray(given, object)
     if array.ndim != 1:
         what = f"an array of shape {array.shape}" if array.ndim else f"{given!r:.60}"
@@ -146,6 +147,7 @@ def _check_ends(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns)
     grid = scenario.time_grid()
     for key, column in numbers.items() if loops else ():
         first = Plan(loops[0], grid).structure
+        # Only the ends: a plan for each of thousands of values would take longer than some batches.
         for row in sorted({int(np.argmin(column)), int(np.argmax(column))} - {0}):
             other = first
             with suppress(PodusvError):

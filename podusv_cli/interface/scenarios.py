@@ -71,6 +71,7 @@ def load(source: Source, changes: Changes | None = None, *, trust: bool = False)
     return load_scenario(source, changes, trust=trust).scenario
 
 
+# Runs are read back here, and Python has no option that insists on larger ones.
 CHECKS = (unknown_codes, limits(read_back=True, insist=""))
 
 

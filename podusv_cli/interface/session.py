@@ -133,6 +133,7 @@ class Session:
         self._metrics = scenario.metrics_of(plan)
         self._march = SteppedRun(plan, march, compiled=scenario.simulation.compiled)
         self._named = DEMANDED[: len(scenario.actuator.limits())]
+        # A view: what is written there is what the march reads.
         self._demand = self._march.vectors.law_table[FIRST : FIRST + len(self._named)]
 
     @property
@@ -264,6 +265,7 @@ def schedule_demands(
     changes = {
         "control.period": period,
         "simulation.duration": min(len(demands) * every * run.step, run.duration),
+        # A session that ends early may have fewer steps than that, which loading refuses.
         "log.every": min(scenario.log.every, steps),
         "controller": {"kind": "schedule", "between": "hold", "rows": "\n".join(rows)},
     }

@@ -68,6 +68,7 @@ def write(path: Path, content: bytes) -> None:
     try:
         part.write_bytes(content)
         part.replace(path)
+    # Also on Ctrl+C, which would leave the part behind.
     except BaseException:
         part.unlink(missing_ok=True)
         raise

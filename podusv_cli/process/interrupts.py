@@ -34,6 +34,7 @@ class Interrupts:
         self.deferred = False
         self.ending = False
         self._waiting = False
+        # Long ago: the clock may start at 0, and the very first signal must count.
         self._last = -SAME_INTERRUPT
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
@@ -58,8 +59,10 @@ def _end_process(number: int) -> None:
     """End this process and its workers at once; the next run deletes their unfinished folders."""
     import multiprocessing  # which not every command needs
 
+    # Not `print`: the signal may have come within one, which cannot be entered twice.
     with suppress(OSError):
         os.write(STDERR, ENDED)
+    # `os._exit` runs no cleanup, so nobody else would end them.
     for worker in multiprocessing.active_children():
         worker.kill()
     os._exit(SIGNALLED + number)

@@ -76,6 +76,7 @@ class _Handler(BaseHTTPRequestHandler):
         """
         if not self._is_known() or (size := self._size()) is None:
             return
+        # A form elsewhere can send text; for JSON a browser asks leave first, and gets none.
         kind, origin = self.headers.get("Content-Type"), self.headers.get("Origin")
         if kind != "application/json" or (origin and origin[7:] not in self.server.hosts):
             self._refuse(403, "only the page itself may ask, in JSON")
@@ -104,6 +105,7 @@ class _Handler(BaseHTTPRequestHandler):
     def _size(self) -> int | None:
         """The bytes of a question; None, and it is refused, where that is no number or too many."""
         text = self.headers.get("Content-Length", "")
+        # int() takes signs, underscores and digits of other scripts, too.
         if not re.fullmatch("[0-9]{1,18}", text):
             self._refuse(400, "Content-Length must be the bytes of a question")
         elif int(text) > MOST:

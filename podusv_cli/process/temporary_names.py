@@ -34,6 +34,7 @@ def find_abandoned(folder: Path) -> Iterator[tuple[Path, str]]:
     Those of other machines are left out, since it is unknown here whether their process runs.
     """
     with suppress(OSError):
+        # A list, as callers remove one by one what they are given.
         for entry in list(os.scandir(folder)):
             match = _PART.fullmatch(entry.name)
             if match and match["machine"] == _machine() and not is_running(int(match["process"])):

@@ -110,6 +110,7 @@ def run_shares(
         if whole.killed and len(share) > 1:
             by_job |= zip(share, run_all([jobs[n] for n in share], workers=workers), strict=True)
         else:
+            # Without a result, as after an interrupt, each job has the outcome of its share.
             outcomes = whole.result or [whole] * len(share)
             by_job |= zip(
                 share,
@@ -236,6 +237,7 @@ class Spawned:
 
     def dismiss(self) -> None:
         """End the processes that wait."""
+        # All pipes first, so that the processes end side by side.
         for pipe, _ in self._idle:
             pipe.close()
         for _, process in self._idle:
@@ -303,6 +305,7 @@ class _Pool:
                 message = pipe.recv()
             except (EOFError, OSError, UnpicklingError):  # killed, perhaps within a message
                 message = None
+                # The pipe closes a moment before the process has ended.
                 process.join()
             if isinstance(message, float):
                 self._progress(number, message)
@@ -368,6 +371,7 @@ def _send_outcome(job: Job, pipe: Pipe, interrupts: Interrupts) -> None:
     outcome = outcome_of(job, pipe.send, interrupts)
     try:
         pipe.send(outcome)
+    # What cannot be pickled is any of these three, by its kind.
     except (AttributeError, TypeError, PicklingError) as error:
         pipe.send(Outcome(failure=f"its result cannot be sent: {error}"))
 

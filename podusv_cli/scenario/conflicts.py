@@ -114,6 +114,7 @@ def _conflicts_of_laws(scenario: Scenario) -> Conflicts:
     """Laws that fail when they are asked what they declare: their own fault, whatever it is."""
     for key, law in scenario.laws().items():
         try:
+            # Code of a plug-in, which may raise anything.
             law.sample_period(), law.declared()
         except Exception as error:
             yield key, f"{describe(law)}: asked what it logs, {in_a_line(error)}"

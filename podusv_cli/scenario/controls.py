@@ -196,6 +196,7 @@ def _span(key: Key, now: float, usual: float, length: float) -> dict[str, Any]:
         return {"low": min(low, now), "high": max(high, now)}
     if low is not None and low >= 0.0 and now > 0.0:
         return {"low": max(now / REACH, low), "high": now * REACH, "log": True}
+    # A number that is 0 has no logarithm.
     if low is not None and low >= 0.0:
         return {"low": low, "high": 10.0 * size}
     if key.unit == "rad":

@@ -82,6 +82,7 @@ def explain(
         return [EXTENDS, *_rows(top.keys.values())]
     if name == EXTENDS.key:
         return [EXTENDS]
+    # Entries of a list are described once, whatever their position.
     place = tuple(
         NUMBER if str(step).isdecimal() else step for step in with_dotted_key(route(name))
     )

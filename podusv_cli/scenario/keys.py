@@ -198,6 +198,7 @@ class Key:
         for member in members(self.annotation):
             parts, types = get_args(member), None
             if get_origin(member) is tuple and is_position:
+                # A list of fixed length has a type for each place, an open one a single type.
                 types = parts[:1] if parts[-1] is Ellipsis or step == NUMBER else parts[int(step) :]
             if get_origin(member) is dict and not is_position:
                 types = parts[1:]

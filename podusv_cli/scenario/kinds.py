@@ -57,6 +57,7 @@ def over(base: Node, own: Node, key: Key) -> Node:
     if not new or not isinstance(own.content, dict):
         return own
     taken = {name: part for name, part in base.mapping.items() if _is_taken(name, base, new, key)}
+    # By kind, `merge` would set the base aside once more.
     return merge(replace(base, content=taken), own, by_kind=False)
 
 

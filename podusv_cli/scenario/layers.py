@@ -59,6 +59,7 @@ def self_contained(
 def _settings(source: str, overrides: Sequence[str], faults: list[Fault]) -> Node:
     """All overrides as one layer, so that their order matters only where they give one key."""
     trees = [_override_tree(override, faults) for override in overrides]
+    # Not by kind: a kind that one of them gives must not take out what another one gives.
     return reduce(partial(merge, by_kind=False), trees, Node({}, Mark(source)))
 
 
@@ -171,6 +172,7 @@ def _read_base(
         return None
     path = relative_to(sources[-1], above.content)
     text = read_text(path, above.mark, "extends", faults)
+    # Real paths, as a circle may lead through a link.
     if text is not None and os.path.realpath(path) in [
         os.path.realpath(source) for source in sources
     ]:

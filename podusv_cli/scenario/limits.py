@@ -16,6 +16,7 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory import monitor
 
 NUMBER = 8  # bytes
+# 100 s of computing with a small law, see STEP.
 MOST_STEPS = 10**8
 MOST_CONTENT = 4 * 10**9  # bytes of log that podusv reads back
 HELD = 256 * 2**20  # bytes of a log that is held in memory; a larger one is made on the disk
@@ -96,6 +97,7 @@ def estimate(scenario: Scenario, plan: Plan) -> Size:
 def disk_needed(sizes: Sequence[Size], at_once: int) -> float:
     """Bytes that have to be free on the disk for these runs, `at_once` of them made at a time."""
     scratch = sorted(size.scratch for size in sizes)[-at_once:]
+    # The least of each: a run is refused only where it surely does not fit.
     return sum(size.least for size in sizes) + sum(scratch)
 
 

@@ -229,6 +229,7 @@ def load_stored(
     fill_sections(root, keys_of(scenario_class(known)), faults, without_files)
     _raise_damage(faults, source)
     scenario, filled = _build_scenario(root, known, faults, remarks)
+    # Without CLASHES: what a folder keeps passed that check when it was run.
     return Loaded(scenario, filled, text, root, tuple(remarks)).pass_checks(faults, checks)
 
 

@@ -207,6 +207,7 @@ class Scenario(Component):
             return self
         facts = self.facts
         several = {label: law.sized(facts) for label, law in self.controllers.items()}
+        # The very object, as `open_choice` tells it by identity.
         law = next(iter(several.values())) if self.open_choice else self.controller.sized(facts)
         seas = tuple(sea.sized(facts) for sea in self.disturbances().values())
         return self.model_copy(

@@ -247,6 +247,7 @@ def _path(file: Node) -> str:
 
 def _whole(text: str, name: str, key: str, faults: list[Fault]) -> Node:
     """The text of a file as it is, for a key that takes a text."""
+    # As editors on Windows write files; the same content is to give the same scenario.
     lines = text.removeprefix("\ufeff").replace("\r\n", "\n")
     return text_node(lines, Mark(name), key, faults, text=lines)
 

@@ -94,6 +94,7 @@ def load_plugins(
             entries[place] = _resolved_entry(plugin, name.mark, wanted)
     plugins = tuple(dict.fromkeys((*known.values(), *installed_plugins())))
     try:
+        # Made for its error alone: two components may have one kind.
         scenario_class(plugins)
         entries = {p.name: _resolved_entry(p, given.mark) for p in _plugins_used(root)} | entries
     except LawError as error:

@@ -179,6 +179,7 @@ def _number(cell: str) -> float:
 
 
 def _point(pair: Pair, name: str) -> Node:
+    # Adding 0.0 makes 0.0 of -0.0.
     numbers = [round(part, DIGITS) + 0.0 for part in pair]
     return Node(tuple(Node(number, Mark(name)) for number in numbers), Mark(name))
 

@@ -186,6 +186,7 @@ def _nominal(root: Node, plugins: Plugins, faults: list[Fault]) -> Node:
     if "preset" in given.content:
         return root.with_entry("nominal", _from_preset(given, "nominal", plugins, faults))
     whole = _with_source(merge(vessel, given), plugins)
+    # The vessel has a message for that; its copy is not to have a second one.
     lost = not isinstance(vessel.content, dict)
     return root.with_entry("nominal", replace(whole, faulty=whole.faulty or lost))
 
@@ -224,6 +225,7 @@ def _with_source(vessel: Node, plugins: Plugins) -> Node:
     known = name in preset_names(VESSELS, plugins)
     base = preset_values(VESSELS, name, [], plugins) if known else None
     stem = str(base.get("source")).removesuffix(".") if base else ""
+    # A source in the scenario's own words stays as it is.
     if not base or not source or not str(source.content).startswith(stem):
         return vessel
     fields = Vessel.model_fields.items()

@@ -124,6 +124,7 @@ def _motion(target: Vector) -> tuple[Vector, Vector, Vector]:
     """
     _, _, x_dot, y_dot, x_ddot, y_ddot = target.T
     speed = np.hypot(x_dot, y_dot)
+    # Divided by infinity, a target that stands has a turn rate of 0.
     moving = np.where(speed > STANDING, speed, np.inf)
     # Rounded, so that a circle has one turn rate and `_balance` solves for it once.
     turn = np.round((x_dot * y_ddot - y_dot * x_ddot) / moving**2, 9)

@@ -32,6 +32,7 @@ def yaml_text(data: Mapping[str, Any]) -> str:
 
 
 def _dump_yaml(data: Mapping[str, Any], dumper: Any) -> str:
+    # Never folded: a long text in one line reads back as it is.
     text = yaml.dump(data, Dumper=dumper, sort_keys=False, allow_unicode=True, width=1 << 30)
     return str(text)
 
@@ -39,6 +40,7 @@ def _dump_yaml(data: Mapping[str, Any], dumper: Any) -> str:
 class _Dumper(yaml.SafeDumper):
     """Blocks for mappings, brackets for lists of scalars, quotes around all text but words."""
 
+    # What stands twice is written twice, since podusv reads no aliases.
     def ignore_aliases(self, data: Any) -> bool:
         return True
 

@@ -36,6 +36,7 @@ COMMANDS = {  # what MAV_CMD of a mission are called that are no places
     2000: "picture",
 }
 USUAL = {"frame": 3, "command": 0}  # of a plan's item that does not say
+# Frames and commands of MAVLink have 16 bits. int() would refuse infinity and NaN.
 MOST_CODE = 1e5
 LONGEST_NAME = 40  # letters of a word that a file gives
 POINTS = re.compile(r"^\s*(?:points|polygon)\s*=\s*(.*)$", re.MULTILINE | re.IGNORECASE)
@@ -71,6 +72,7 @@ def route_of(text: str) -> RouteFile | None:
                 return without_repeats(read(begin))
             except RecursionError as error:
                 raise RouteFault("has brackets in brackets without end") from error
+    # A behaviour of MOOS-IvP may begin with anything, so its points are searched for.
     return without_repeats(_moos(begin)) if POINTS.search(begin) else None
 
 

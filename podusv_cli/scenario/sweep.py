@@ -88,6 +88,7 @@ class Quantity(Distribution):
         """
         if self.rows:
             numbers = self.lines.rows[drawn]
+            # `targets` has all columns for each of the keys, one key after the other.
             return float(numbers[place % len(numbers)])
         if self.times:
             return own * drawn

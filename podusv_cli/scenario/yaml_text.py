@@ -29,6 +29,7 @@ from podusv_cli.scenario.shipped import PREFIX, file_of, names
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted_key
 
 MAX_BYTES = 1_000_000
+# Reading goes down by recursion, and must not come to the end of Python's stack.
 MAX_DEPTH = 32
 MAX_NODES = 20_000
 ENDINGS = (".yaml", ".yml")
@@ -250,6 +251,7 @@ class _Reader:
             raise _CannotContinue(
                 self._mark(0, 0), "starts with a byte order mark; save as UTF-8 without BOM"
             )
+        # The events: start of the stream, start of the document, its value, and the two ends.
         self._next()
         if isinstance(self._next(), yaml.StreamEndEvent):
             raise _CannotContinue(Mark(self._source), "is empty")
@@ -353,6 +355,7 @@ class _Reader:
         entries: dict[str, Node] = {}
         while not isinstance(head := self._next(), yaml.MappingEndEvent):
             key = self._key(head, route, _decimal_comma(head, entries))
+            # Read before its key is judged, as its events have to be gone in any case.
             entry = self._node(self._next(), (*route, key or "?"))
             if key in entries:
                 first = entries[key].key_mark

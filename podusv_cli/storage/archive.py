@@ -79,6 +79,7 @@ def name_fault(name: str) -> str:
 def entry_of(name: str) -> zipfile.ZipInfo:
     """An entry of a plain file without the time at which it is packed."""
     entry = zipfile.ZipInfo(name, EARLIEST)
+    # Left to zipfile, the system would be the packer's, and the bytes would differ with it.
     entry.create_system, entry.external_attr = 3, PLAIN << 16  # Unix
     entry.compress_type = zipfile.ZIP_DEFLATED
     return entry
@@ -195,6 +196,7 @@ def open_archive(path: Path) -> Iterator[Archive]:
     with files.open_regular(path) as file:
         try:
             archive = zipfile.ZipFile(file)
+        # NotImplementedError says that the archive is of a later version of zip.
         except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
             text = f"{path} is no archive of podusv pack, or not all of one ({error})"
             raise StorageError(text) from error

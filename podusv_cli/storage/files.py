@@ -81,6 +81,7 @@ def write_all(contents: Mapping[Path, bytes]) -> None:
             with storage_errors(f"cannot write {path} ({len(contents[path])} bytes)"):
                 os.replace(part, path)
     finally:
+        # Those that were renamed are not there any more.
         for part in parts.values():
             with suppress(OSError):
                 part.unlink()
@@ -150,6 +151,7 @@ def disk_array(folder: Path, size: int) -> Vector:
     # Windows gives the file a name until the array is gone, and renames no folder with it inside.
     place = None if os.name == "nt" else folder
     with storage_errors(failure), tempfile.TemporaryFile(dir=place) as file:
+        # A file that is only made longer is sparse: it takes space when a page is first written.
         if hasattr(os, "posix_fallocate"):
             os.posix_fallocate(file.fileno(), 0, 8 * size)
         else:
@@ -164,6 +166,7 @@ def is_empty(folder: Path) -> bool:
     """
     remove_abandoned_files(folder)
     with storage_errors(f"cannot read {folder}"):
+        # A writer's lock is no content: whoever asks may hold it.
         return not folder.exists() or {path.name for path in folder.iterdir()} <= {*LOCKS}
 
 
@@ -248,6 +251,7 @@ def read_text(path: Path) -> str:
         size = file_size(file)
         if size > LARGEST_TEXT:
             raise StorageError(f"cannot read {path}: {size} bytes, at most {LARGEST_TEXT} allowed")
+        # No more than was measured: the file may grow meanwhile.
         content = file.read(size)
     try:
         return content.decode()

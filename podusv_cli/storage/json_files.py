@@ -51,6 +51,7 @@ def read_as(path: Path, model: type[Model]) -> Model:
 def parsed_as(text: str, path: Path, model: type[Model]) -> Model:
     """As `read_as`, of the text of the file at `path`, which messages name."""
     try:
+        # By way of JSON text: from Python's own lists a strict model would take no tuples.
         return model.model_validate_json(
             json.dumps(parse_json(text, path))
         )  # a list is a tuple, too

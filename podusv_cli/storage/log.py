@@ -228,6 +228,7 @@ def describe(thing: h5py.HLObject, facts: Mapping[str, str]) -> None:
 def text(words: str) -> np.ndarray[tuple[()], np.dtype[np.bytes_]]:
     """A text as HDF5 stores it."""
     # Of fixed length: variable-length strings make readers of damaged files hang.
+    # Names of files that are no UTF-8 have lone halves of characters, which UTF-8 does not encode.
     content = words.encode("utf-8", "backslashreplace")
     return np.array(content, dtype=h5py.string_dtype("utf-8", max(1, len(content))))
 

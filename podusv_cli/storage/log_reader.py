@@ -75,6 +75,7 @@ def _open_log(
         if file_size(raw) > largest:
             sizes = f"{file_size(raw)} bytes, at most {largest} allowed"
             raise StorageError(f"cannot read {path}: {sizes}{ELSEWHERE}")
+        # By the open file whose size was checked: under its name there may be another one by now.
         with hdf5.readable(path, "a log"), h5py.File(raw) as file:
             if misfit := other_format(int(file.attrs["podusv_format"])):
                 raise ValueError(misfit)

@@ -44,6 +44,7 @@ class Manifest(BaseModel):
 
 def write(folder: Path, status: Status) -> Manifest:
     """Write the manifest of `folder`. Raises StorageError, also for links and devices in it."""
+    # No file can list its own digest.
     names = sorted(name for name in atomic.names_inside(folder) if name != NAME)
     manifest = Manifest(
         podusv_format=FORMAT, status=status, files={name: _entry(folder / name) for name in names}
@@ -68,6 +69,7 @@ def parse_manifest(text: str, folder: Path) -> Manifest:
     """As `read`, of the text of the folder's manifest."""
     path = folder / NAME
     content = json_files.parse_json(text, path)
+    # Before the keys are checked: those of another format are no damage.
     if misfit := other_format(content.get("podusv_format")):
         raise StorageError(f"{path}: {misfit}")
     try:
@@ -105,6 +107,7 @@ def check(folder: Path, optional: str = "") -> Manifest:
         if entry.bytes > LARGEST_FILE:  # a sparse file may claim any size
             claim = f"{entry.bytes} bytes, at most {LARGEST_FILE} allowed"
             raise StorageError(f"cannot read {path}: {claim}{ELSEWHERE}")
+        # The size first: a file of another size need not be read to its end.
         if os.lstat(path).st_size != entry.bytes or _entry(path) != entry:
             raise StorageError(f"{folder} is not a finished folder: {name} was altered")
     return manifest

@@ -92,6 +92,7 @@ def _git(folder: Path, *words: str) -> str | None:
     """What git says in a folder, or None where it fails, or says nothing within `GIT_PATIENCE`."""
     # Variables that git itself sets, in its hooks for instance, would point to another checkout.
     environment = {key: word for key, word in os.environ.items() if not key.startswith("GIT_")}
+    # `git status` would else lock and rewrite the index, which a git of the user may be using.
     environment["GIT_OPTIONAL_LOCKS"] = "0"
     try:
         done = subprocess.run(

@@ -31,6 +31,7 @@ from podusv_cli.storage.staging import Staging, Taken, remove_abandoned
 LOG, ABOUT, THEORY, MISSING = "log.h5", "about.json", "theory.json", "missing.json"
 RESOLVED, PROVENANCE = "resolved.yaml", "provenance.json"
 STUDY, LOGS = "study.json", "logs"  # in the folder of a study
+# Only laws with V have theory.json, and an older podusv wrote no about.json.
 NEEDED = (LOG, "metrics.json", PROVENANCE, RESOLVED)
 
 
@@ -94,6 +95,7 @@ class RunWriter:
         try:
             check_free_space(final, needed, "log less often (log.every), or elsewhere (--out)")
         except StorageError:
+            # The `with` block is not entered, so that nothing else would remove the hidden folder.
             self._staging.discard()
             raise
 
@@ -134,9 +136,11 @@ class RunWriter:
             self.add_json(MISSING, self.extras.as_json())
         remove_abandoned(self.folder)  # left by killed processes of a comparison
         manifest.write(self.folder, status)
+        # Before the renaming: after a crash the final name must not stand for missing files.
         for inner, _, _ in os.walk(self.folder):
             files.sync_folder(Path(inner))
         try:
+            # Once more: something may have come there while the simulation ran.
             _check_replaceable(self.final, self._force)
             self._staging.publish(replace=self._force and whole and not missing)
         except Taken as error:
@@ -151,6 +155,7 @@ class RunWriter:
 
         Another process may take a number meanwhile, so each is tried.
         """
+        # Without the first, which is the name that was taken.
         for path in islice(_numbered_folders(self.final), 1, None):
             with suppress(Taken):
                 _check_replaceable(path, force=False)
@@ -234,6 +239,7 @@ class UnreadLog:
     @cached_property
     def recording(self) -> Recording:
         """Its content. Raises StorageError."""
+        # Here, so that commands that look at numbers alone do not load HDF5.
         from podusv_cli.storage import log_reader  # h5py is slow to import
 
         return log_reader.read_log(self.path)

@@ -18,6 +18,7 @@ from podusv_cli.core.system import rename_folder
 from podusv_cli.process.temporary_names import find_abandoned, temporary_name
 from podusv_cli.storage import files
 
+# What systems answer where the name is that of a folder with files, or of a file.
 _TAKEN = (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR)
 # Nothing to exchange with, or no exchange on this system or file system.
 _NO_EXCHANGE = (errno.ENOENT, errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)
@@ -39,6 +40,7 @@ class Staging:
                 final.parent.mkdir(parents=True, exist_ok=True)
                 self._box.mkdir()
                 self.folder.mkdir()
+        # An interrupt, too, must leave nothing behind.
         except BaseException:
             self.discard()
             raise
@@ -61,6 +63,7 @@ class Staging:
                 if not replace:
                     raise
                 self._replace()
+        # After an exchange the older folder lies in the box, and goes with it.
         self.discard()
         files.sync_folder(self.final.parent)
 
@@ -75,6 +78,7 @@ class Staging:
         except OSError as error:
             if error.errno not in _TAKEN:
                 raise
+            # Renaming replaces no folder but an empty one, so nothing can be lost by trying.
             text = f"{self.final} is there already and is left as it is"
             raise Taken(text) from error
 
@@ -85,6 +89,7 @@ class Staging:
         fails.
         """
         if not self._exchange():
+            # Another process may have moved the old one away.
             with suppress(FileNotFoundError):
                 rename_folder(self.final, _old(self._box))
             self._rename()

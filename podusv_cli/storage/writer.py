@@ -40,6 +40,7 @@ def sole_writer(
     make_folder(folder)
     _check_plain(folder)
     path = folder / what
+    # The wait may take minutes, and nothing is begun that an interrupt could leave in half.
     with storage_errors(f"cannot lock {folder}"), interrupts_enabled():
         lock = _lock_folder(path, patience, warn)
     try:
@@ -62,6 +63,7 @@ def _lock_folder(path: Path, patience: float, warn: Callable[[str], None]) -> Ba
 
     lock = FileLock(path, fallback_to_soft=False)  # a soft one outlives a process that is killed
     try:
+        # First without patience, so that the user is told before the wait and not after it.
         with suppress(Timeout):
             lock.acquire(timeout=0.0)
             return lock
@@ -96,6 +98,7 @@ def _check_plain(folder: Path) -> None:
     Through a link podusv would write elsewhere; what goes meanwhile is another process's.
     """
     for path in map(folder.joinpath, names_inside(folder)):
+        # What is gone since it was listed leads nowhere.
         with storage_errors(f"cannot read {path}"), suppress(FileNotFoundError):
             mode = path.lstat().st_mode
             if not stat.S_ISREG(mode):

@@ -135,6 +135,7 @@ def is_finite(component: Component) -> None:
 def remembers_nothing(component: Component) -> None:
     """The same state gives the same bits, whatever was evaluated in between."""
     first = [evaluate_component(component, seed) for seed in range(STATES)]
+    # In the other order, as a memory of the state before would show.
     again = [evaluate_component(component, seed) for seed in reversed(range(STATES))][::-1]
     for seed, (one, other) in enumerate(zip(first, again, strict=True)):
         for a, b in zip(one, other, strict=True):
@@ -143,6 +144,7 @@ def remembers_nothing(component: Component) -> None:
 
 def runs_alike_compiled_and_plain(component: Component) -> None:
     """A run in machine code has the numbers of one in plain Python."""
+    # Not to the bit: a component of one's own may call `math`, whose last digits may differ.
     _compare(run_with(component, True), run_with(component, False), rtol=1e-9, atol=1e-12)
 
 
@@ -240,6 +242,7 @@ def loop_with(component: Component) -> ClosedLoop:
         "disturbance": Calm(),
         "actuator": Ideal(),
         "controller": Pid(),
+        # Where the true state is seen, there is nothing to estimate.
         "measurement": Sensors() if isinstance(component, Estimator) else Exact(),
     }
     place = next(name for name, base in ROOMS.values() if isinstance(component, base))
@@ -297,6 +300,7 @@ def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vec
     """
     memory, k = law.start(x, target, usual_vessel()), bundle(law.constants_with(usual_vessel()))
     memory = memory + random.normal(0.0, 0.1, len(memory))
+    # NaN in every place, so that one that is left unwritten is no finite number in the end.
     demands = len(DEMAND) + law.asks_sway()
     outputs = [np.full(size, np.nan) for size in (demands, len(memory), len(law.signals))]
     if law.takes_samples():

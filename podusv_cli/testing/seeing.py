@@ -97,6 +97,7 @@ def measures_the_vessel(sensors: Measurement) -> None:
     true = np.array([pose_at(instant * STEP) for instant in range(STEPS)])
     for i, state in enumerate(STATE):
         came = rows[:, FRESH + i] == 1.0
+        # Through two points any line goes, with a correlation of 1 or -1.
         if came.sum() > 2:
             correlation = np.corrcoef(rows[came, i], true[came, i])[0, 1]
             assert correlation > 0.5, f"{state.name}: correlation {correlation:.2g} with the truth"
@@ -118,6 +119,7 @@ class EstimatorUnderTest:
         self.estimator, self.table = estimator, estimator.table()
         self.k = bundle(estimator.constants_with(nominal))
         self.state = guard(estimator.start(x, nominal))
+        # NaN shows a rate that `follow` leaves unwritten.
         self.rate = np.full(len(self.state), np.nan)
         self.rate[-MARGIN:] = BEYOND
 

@@ -169,6 +169,7 @@ def compare_gathered(
             from podusv_cli.doubt.outputs import HEAD, row
             from podusv_cli.workflows.doubt import doubt_of
 
+            # Within a folder that is new, `force` can replace nothing of the user's.
             own = replace(request, out=writer.folder / "doubt", force=True)
             doubted = doubt_of(loaded, own, progress)
             result = replace(result, doubts=[HEAD, *map(row, doubted.answers)])
@@ -178,6 +179,7 @@ def compare_gathered(
         _add_report(writer, result, given.name, origin, extras, progress, request)
         folder = writer.finish(missing=lost)
         made = {run.label for run in result.runs}
+        # A log was measured, so no step of its own has to converge.
         runs = [m for m in given.members if m.label in made and not m.track]
         unverified = tuple(m.label for m in runs if not is_verified(m.resolved))
         return Compared(folder, result, writer.status, tuple(extras.missing), doubted, unverified)
@@ -196,6 +198,7 @@ def _check_metrics(request: Request, members: Sequence[Member]) -> None:
 
 def _keep_apart(items: Sequence[Path], target: Path) -> None:
     """Raise UsageError where writing the comparison would touch a run that it compares."""
+    # Real paths, as one of them may lead through a link into the other.
     there = Path(os.path.realpath(target))
     for item in items:
         here = Path(os.path.realpath(item))
@@ -351,6 +354,7 @@ def _with_departures(runs: Sequence[PastRun], members: Sequence[Member]) -> list
     Only simulated runs have these distances.
     """
     measured = {m.label: m.track for m in members if m.track}
+    # There is one track at most; without it the list is empty, and the runs stay as they are.
     return [
         replace(run, cost={**run.cost, **track.departures(run.counted_recording)})
         if run.label not in measured

@@ -151,9 +151,11 @@ def judging(subject: Subject, runs: Mapping[str, PastRun]) -> Judge:
                 label: _simulate_in_memory(label, Case.of(new), subject.parsed)
                 for label, new in moved.items()
             }
+        # A world without a run is a failed one, and the search goes on with the others.
         except PodusvError as error:
             return Judged({}, {}, str(error))
         every, scenarios = {**runs, **made}, {**subject.singles, **moved}
+        # What cannot be computed is noted nowhere: a claim about it has no answer, which says it.
         measured = with_margins([*every.values()], scenarios, subject.parsed, Extras())
         metrics = metrics_of(measured)
         verdicts = claims.judge(subject.parsed, {e.label: e for e in measured}, metrics)

@@ -176,7 +176,9 @@ def join_members(groups: Sequence[Members]) -> Members:
     members = distinct(member for group in groups for member in group.members)
     labels = iter(member.label for member in members)
     # For each group: its claims' names for runs, and the labels these have now.
+    # The names come first: `zip` then ends without taking a label of the next group.
     called = [dict(zip(group.names, labels, strict=False)) for group in groups]
+    # Cut, as a folder is named after it.
     title = "-".join(dict.fromkeys(group.name for group in groups))[:80]
     return Members(title, members, claims=_label_claims(groups, called))
 

@@ -197,6 +197,7 @@ class Live:
         """
         began = time.thread_time()
         if rest or wanted:
+            # The file may have been edited: nothing that was made of its earlier state may stay.
             self._bases.clear()
             self._puts.clear()
             loaded = self.load(moved)

@@ -39,6 +39,7 @@ def loaded_for(
     """
     if request.out and request.out.exists() and not request.out.is_dir():
         raise UsageError(f"--out {request.out} is a file; name a folder")
+    # A study or search keeps no logs, so those of its runs may be of any size.
     checks = (unknown_codes, limits(allow_large=True), *faults)
     given = request.overrides, checks, request.plugins
     if not isinstance(config, Path):

@@ -56,6 +56,7 @@ def _join_stores(
     store.open(started.isoformat(timespec="seconds"), texts)
     session = SessionLog(out, request.argv, started, (), [other.folder for other in others])
     join(store, others)
+    # It made no runs itself: they count for the sessions of the folders that are joined.
     session.end(0)
     if mixed := mixture(out):
         request.warn(mixed)

@@ -91,6 +91,7 @@ def optimum(
     CasADi and for a scenario that it cannot take, ScenarioError, LawError, NotConvergedError,
     StorageError.
     """
+    # A missing library is told before the scenario is loaded.
     collocation.casadi()
     checks = (unknown_codes, limits(request.allow_large))
     loaded = open_scenario(config, request, checks)

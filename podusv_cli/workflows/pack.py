@@ -167,6 +167,7 @@ def open_packed(path: Path) -> Iterator[Packed]:
         sizes = {name: size for name, size in packed.sizes.items() if name != manifest.NAME}
         for name, size in sizes.items():
             entry = listed.files.get(name)
+            # What is listed has the listed size; unlisted are wheels alone, which no manifest has.
             if entry.bytes != size if entry else not _is_wheel(name):
                 raise packed.fault(f"{name} is not as its {manifest.NAME} lists it")
         missing = {*listed.files} - {*sizes}

@@ -103,6 +103,7 @@ def plot(runs: Sequence[Path], request: Request, choice: PlotChoice = PlotChoice
         )
     sheets = _choose_sheets(request.names, known, shown, choice.signals)
     planned = [f"{sheet.name}.{form}" for sheet in sheets for form in request.formats]
+    # Known before it is drawn, as every file's place is checked first.
     film = file_name()
     planned += [film] * choice.animated
     _check_not_finished(out, planned)
@@ -227,6 +228,7 @@ def _check_not_finished(out: Path, names: Iterable[str]) -> None:
 
     The folder may be `out` or one around it.
     """
+    # Where links lead to, as that is where files are written.
     place = Path(os.path.realpath(out))
     for folder in (place, *place.parents):
         listed = _list_folder(folder)

@@ -110,6 +110,7 @@ def _scenario(run: RunFolder, request: Request) -> Scenario:
     return load_stored(
         run.resolved_yaml,
         str(run.path / run_folder.RESOLVED),
+        # The new log is read back, to be compared with the old one.
         checks=(limits(request.allow_large, read_back=True),),
         plugged=of_folder(request.trust),
     ).scenario

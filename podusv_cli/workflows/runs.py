@@ -114,6 +114,7 @@ def runs(root: Path, where: Sequence[str] = (), sort: str = "") -> list[ListedRu
 def _below(root: Path) -> Iterator[ListedRun]:
     """Folders of results; links and hidden folders are not followed."""
     for place, inside, names in os.walk(root):
+        # In place: `os.walk` goes on with this very list.
         inside[:] = sorted(name for name in inside if not name.startswith("."))
         mark = next((name for name in KINDS if name in names), None)
         # A results' folder has a manifest once finished; studies and searches are listed before.

@@ -263,6 +263,7 @@ def _thrust(words: str, given: str, out: Path) -> tuple[float, str]:
 
     `words` are a force or a file, `given` the whole option. Raises UsageError.
     """
+    # The name of a file may begin with a digit, too.
     if words[:1].isdigit() and not os.path.isfile(words):
         return _number("thrusters", words, "N"), ""
     if not os.path.isfile(words):

@@ -159,6 +159,7 @@ def _march_study(
         kept = f"the {seen.made} runs that are made" if seen.made else "all runs that were made"
         raise interruption(kept, "sweep run", store.folder) from stop
     finally:
+        # After an interrupt, too: without an end the session would count as one that was killed.
         timed = {"processor_s": seen.computed, "timed_runs": seen.ran}
         session.end(
             seen.made - seen.before, {**timed, "ended": seen.ended, **executor.provenance()}
@@ -225,6 +226,7 @@ def answer_study(
             request.warn(f"logs of kept runs are missing; they are made by: {again}")
         if contradicted := contradiction(kept):
             results = results.without_verdicts(contradicted)
+            # Once more: those above have verdicts of runs that are in doubt now.
             outputs.write_tables(store.folder, results)
         request.say("drawing figures and writing the report")
         outputs.write_report(store.folder, results, kept, extras, figures=request.figures)

@@ -85,6 +85,7 @@ def tune(config: Config, request: Request, tell: Tell) -> Tuned:
     KeyboardInterrupt; every batch that was finished is kept.
     """
     started = datetime.now(UTC)
+    # A missing library is told before anything is loaded or written.
     optuna()
     loaded, folder = _load_config(config, request)
     with sole_writer(folder):

@@ -23,6 +23,7 @@ from podusv_cli.studies.bench.runs import BenchRun
 
 STEPS = (0.4, 0.2)  # s, of the finest of three grids; the next where IPOPT finds nothing
 BEGINNINGS = 2  # how many laws the search begins from: the best of the case
+# What an optimum depends on. It has no law, and sees all without sensors.
 TASK = {"vessel", "start", "path", "disturbance", "actuator", "simulation"}
 
 CaseName = tuple[str, str, str]

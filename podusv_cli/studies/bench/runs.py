@@ -93,4 +93,5 @@ def _first(message: str) -> str:
 
 def _thin_grid(grid: TimeGrid) -> TimeGrid:
     """The grid with so few logged rows as a track needs."""
+    # Metrics are gathered at every step, so they do not depend on it.
     return replace(grid, log_every=max(1, grid.steps // POINTS))

@@ -66,6 +66,7 @@ class Parsed:
     @cached_property
     def statistics(self) -> int:
         """How many different statistics the claim has."""
+        # As long as it is parsed, the claim has none.
         return len({link.text for link in self.links}) or 1
 
 
@@ -277,6 +278,7 @@ def _verdict(parsed: ParsedStudyClaim, tried: _Evaluation) -> StudyVerdict:
     """
     runs, answers = tried.runs, tried.answers
     broken = sum(int(np.sum(runs.broken(law) & runs.done(law))) for law in parsed.parsed.laws)
+    # The samples that are there count the broken runs' draws.
     others = replace(tried, whole=False, samples={}) if broken else tried
     return StudyVerdict(
         name=parsed.name,

@@ -173,6 +173,7 @@ def shortfalls(tree: ast.expr, runs: OfOneRun, kept: bool = True) -> Iterator[Ve
         case ast.Compare(left=left, ops=signs, comparators=others):
             sides = [np.broadcast_to(runs.side(s), runs.ended.shape) for s in (left, *others)]
             for sign, (a, b) in zip(signs, pairwise(sides), strict=True):
+                # Within a `not` the sides change places.
                 smaller, larger = (a, b) if isinstance(sign, (ast.Lt, ast.LtE)) is kept else (b, a)
                 with np.errstate(invalid="ignore"):  # of two that never happened
                     yield np.where(smaller <= larger, 0.0, smaller - larger)

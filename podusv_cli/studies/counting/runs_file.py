@@ -189,6 +189,7 @@ class RunsTable:
     def causes(self) -> dict[tuple[int, int, int], str]:
         """Why runs did not finish, by law, cell and draw."""
         runs = map(tuple, self._file["failed_run"][()].tolist())
+        # Not strict: without failed runs the file has one empty cause.
         return dict(zip(runs, (c.decode() for c in self._file["failed_cause"][()]), strict=False))
 
     def results(self) -> Iterator[UnitResult]:

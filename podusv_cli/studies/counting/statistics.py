@@ -92,6 +92,7 @@ def digits(number: float, form: str = ".5g", infinite: str = "failed") -> str:
         return "-"
     if np.isinf(number):
         return infinite if number > 0.0 else "no limit"
+    # -0.0 would have its sign.
     return f"{number:{form}}" if number else "0"
 
 
@@ -241,6 +242,7 @@ def draws_for_share(estimate: float, bound: float, level: float) -> int | None:
     # A difference of rounding alone, such as 0.95 of 1 - 0.05.
     if estimate - bound <= 1e-12:
         return None
+    # More draws of the same share decide more, so halving finds the first count.
     count = 1 + bisect_left(range(1, MOST + 1), True, key=decides)
     return count if count <= MOST else None
 

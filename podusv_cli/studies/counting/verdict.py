@@ -163,6 +163,7 @@ class StudyVerdict(Verdict):
                 "the shares found are those asked for, or so near them that no practicable number "
                 "of draws decides"
             )
+        # The estimate can be what is there already, with which the claim is open.
         count, each = max(self.more, self.draws + 1), " in each cell" * (len(self.by_cell) > 1)
         return f"about {count} draws{each} would decide, if shares stay as they are"
 

@@ -40,6 +40,7 @@ def cells(loaded: Loaded, check: Check | None = None) -> tuple[Cell, ...]:
     A value counts as if it stood in the scenario's file: `vessel.m` changes `nominal` too, where
     that is not given. `check` is made of each. Raises ScenarioError with all that is wrong.
     """
+    # Before any cell is made: a few lists can have more combinations than there is memory for.
     _check_grid(loaded)
     faults: dict[Hashable, None] = {}
     made = list(_make_cells(loaded, check, faults))

@@ -211,6 +211,7 @@ def _type(key: str, quantity: Quantity, scenario: Scenario) -> Iterator[str]:
     elif is_whole(describe_key(scenario, steps)) and (way := _real(quantity)):
         seed = "seed: true or " if steps[-1] == "seed" else ""
         yield f"{key} is a whole number, and {way} draws others; write {seed}integers: [low, high]"
+    # A number that is null follows a rule: a draw can set it, and has nothing to add to or scale.
     elif _is_number(own) or (own is None and not quantity.relative):
         return
     elif words and way != "choice":

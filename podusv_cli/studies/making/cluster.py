@@ -84,6 +84,7 @@ def _client(address: str) -> Iterator[Any]:
         raise UsageError("--scheduler needs Dask: pip install 'podusv[cluster]'") from None
     with _silent_talkers():
         try:
+            # Not the default: what else uses Dask in this process keeps the client that it has.
             client = Client(address, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError) as error:
             raise StorageError(
@@ -194,12 +195,14 @@ class Cluster:
         self._look()
         # None: every worker, also one that joins later.
         allowed = frozenset(self._threads) - frozenset(self._refused) if self._refused else None
+        # Where all are refused, units wait: a worker that fits may still join.
         while allowed != frozenset() and self._has_room() and (task := self._next(units)):
             self._submit(replace(task, allowed=allowed))
         return bool(self._running or self._again or self._suspects)
 
     def _has_room(self) -> bool:
         alone = any(task.alone for task in self._running.values())
+        # Without a worker one unit waits at the scheduler, so that one that joins has work at once.
         return not alone and len(self._running) < max(1, WINDOW * sum(self._threads.values()))
 
     def _next(self, units: Units) -> UnitTask | None:
@@ -243,6 +246,7 @@ class Cluster:
             astuple(task.unit),
             digest(self._ours),
             astuple(task.variant) if task.variant else None,
+            # Else Dask would take a unit that is tried again for one that it has made already.
             pure=False,
             workers=sorted(task.allowed) if task.allowed else None,
         )
@@ -255,6 +259,7 @@ class Cluster:
             future = self._finished.get(timeout=LOOK)
         except Empty:
             return None, None
+        # A future that was taken back comes here, too, and is no longer under way.
         return future, self._reply(future) if future in self._running else None
 
     def _reply(self, future: Any) -> Reply:
@@ -289,6 +294,7 @@ class Cluster:
         elif reply.outcome.killed and not task.alone:
             self._suspects.append(replace(task, alone=True))
         else:
+            # No worker has signed it: the unit, alone, ended its worker, or Dask failed.
             if reply.worker:
                 self._machines[reply.worker] = reply.machine
                 self._made.setdefault(reply.worker, []).append(task)
@@ -302,6 +308,7 @@ class Cluster:
             return
         self._looked = time.monotonic()
         try:
+            # All of them: by default newer versions of Dask tell of five.
             workers = self._client.scheduler_info(n_workers=-1)["workers"]
         except LOST as error:
             raise lost_scheduler(error) from error

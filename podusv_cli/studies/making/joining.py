@@ -102,6 +102,7 @@ def _differing(new: UnitResult, earlier: Store, draw: int) -> Iterator[str]:
     )
     one, two = _run(old, draw), _run(new, draw)
     for name, value in one.items():
+        # numpy cannot ask a text whether it is NaN.
         if not np.array_equal(value, two[name], equal_nan=name != "cause"):
             yield name
 

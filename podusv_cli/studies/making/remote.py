@@ -24,6 +24,7 @@ from podusv_cli.studies.making.dispatch import time_unit
 from podusv_cli.studies.making.plan import StudyPlan, Variant, digest, plan
 
 PLANS = 2  # plans that a worker keeps
+# Those whose version the bits of a run may depend on.
 PACKAGES = ("numpy", "numba", "llvmlite")
 Report = dict[str, str]
 Plugins = tuple[tuple[str, str], ...]  # name and text of each file

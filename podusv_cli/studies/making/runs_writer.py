@@ -98,6 +98,7 @@ def _lay_out(part: Path, study: StudyAbout, identity: str, causes: Causes) -> di
                 words = table(sweep, 0, wanted, stream)[name]
                 file.create_dataset(f"{DRAWN}/{name}", data=_column(words))
         file.create_dataset("failed_run", data=np.array(list(causes), np.int64).reshape(-1, 3))
+        # numpy takes an empty list for numbers, so that one empty text stands for no text.
         file.create_dataset("failed_cause", data=_label_array(list(causes.values()) or [""]))
         kinds: dict[str, Any] = {"status": np.uint8, "until": np.float64}
         kinds |= dict.fromkeys(study.measured, np.float64)

@@ -110,6 +110,7 @@ class Store:
     def write(self, result: UnitResult) -> None:
         """Keep the result of a unit. Raises StorageError."""
         unit = result.unit
+        # With its count, since half of a unit begins at the same draw.
         name = f"{unit.law}-{unit.cell}-{unit.first}-{unit.count}.unit"
         files.write_bytes(self.folder / UNITS / name, encode_unit(result, self.seal))
 
@@ -131,6 +132,7 @@ class Store:
         meanwhile, which are left alone. Raises StorageError.
         """
         earlier, units, causes = [*self._earlier()], list[Path](), dict[RunKey, str]()
+        # For the causes alone; each is read again when it is written, so that few are in memory.
         for path in self._units():
             if result := read(path, self.seal):
                 units.append(path)
@@ -142,6 +144,7 @@ class Store:
             causes |= table.causes
         path = self.folder / RUNS
         runs_writer.write(path, self.about, self.seal, causes, self._these(earlier, units))
+        # Read back and checked, before the only other copy is removed.
         runs = self.runs()
         if all(runs.tried(law).all() for law in self.about.laws):
             with files.storage_errors(f"cannot remove the files in {self.folder / UNITS}"):
@@ -209,6 +212,7 @@ class Store:
         }
         for earlier in self._earlier():
             for (law, cell), mask in there.items():
+                # The table has fewer draws where more are asked for now.
                 mask[: earlier.wanted] = earlier.tried(law)[cell]
         for path in self._units():
             if result := read(path, self.seal):

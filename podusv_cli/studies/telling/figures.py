@@ -447,6 +447,7 @@ def _span(axes: Axes, values: Mapping[str, Vector], *shown: float) -> tuple[floa
     finite = [numbers[np.isfinite(numbers)] for numbers in values.values()]
     ends = [*shown, *(end for numbers in finite if len(numbers) for end in _without_tails(numbers))]
     low, high = min(ends, default=0.0), max(ends, default=1.0)
+    # Only positive ends can be logarithmic.
     if 0.0 < low * WIDE < high:
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")

@@ -76,6 +76,7 @@ def missing_runs(folder: Path, results: Results) -> list[KeptRun]:
 
 
 def _failed_runs(runs: RunsTable, law: str, count: int) -> Iterator[KeptRun]:
+    # Transposed, so that the first draws of all cells come, not all draws of the first cell.
     for draw, cell in np.argwhere(runs.failed(law).T)[:count].tolist():
         yield KeptRun(law, cell, draw, "failed")
 

@@ -94,6 +94,7 @@ def page(
 def _laws(results: Results) -> Iterator[tuple[str, str, str, str, list[str]]]:
     """For every law and cell: how many runs failed, the share's interval, and medians."""
     for (law, cell), rows in results.of_places.items():
+        # Failures are the same in the rows of all metrics.
         first = next(iter(rows.values()))
         failed = f"{round(first['failed'] * first['n'])} of {first['n']}"
         share = Interval.of(first, "failed").ends(".3g%")
@@ -239,6 +240,7 @@ def _beside(figures: Sequence[Picture], laws: int) -> list[Picture]:
 
     `laws` is how many laws there are.
     """
+    # Backwards, so that the first of a kind is the one that stays.
     first = {picture.name.partition("-")[0]: picture for picture in reversed(figures)}
     kinds = ("distribution", "ratios") if laws <= FEW else ("distribution",)
     return [first[kind] for kind in kinds if kind in first]

@@ -43,6 +43,7 @@ def _study(scenario: Scenario) -> Faults:
 
 def _budget(tune: Tune) -> Faults:
     """A budget that is less than one batch: `batch` gains, each with all `train` draws."""
+    # With less, no trial might meet all draws, and only such a trial can win.
     least = tune.batch * tune.train
     if tune.budget < least:
         yield (

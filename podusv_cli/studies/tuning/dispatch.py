@@ -33,6 +33,7 @@ class SearchDriver:
         for search in searches:
             self._add(search, search.begin())
         budget = sum(search.plan.tune.budget for search in searches)
+        # After `begin`, which has taken in the batches of earlier sessions: these are made already.
         spent = sum(search.runs_spent for search in searches)
         self.tally = StudyTally(budget, spent, before=spent)
 

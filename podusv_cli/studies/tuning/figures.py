@@ -272,6 +272,7 @@ def slices(
         top = (
             TOP * start if math.isfinite(start) and start > 0.0 else float(np.quantile(shown, 0.75))
         )
+        # matplotlib warns of an axis whose ends are equal.
         panels[0, 0].set_ylim(low - 0.05 * (top - low), max(top, low + 1e-9))
     for axes in panels.ravel()[len(gains) :]:
         axes.set_visible(False)
@@ -304,6 +305,7 @@ def _slice(axes: Axes, gain: Gain, tried: pd.DataFrame, winner: Any) -> None:
         axes.axvline(own, **{**TARGET_LOOK, "linestyle": "--"})
     if gain.log:
         axes.set_xscale("log")
+        # The scenario's own value may lie outside of the range.
         axes.set_xlim(0.9 * min(gain.low, gain.own), 1.1 * max(gain.high, gain.own))
         axes.xaxis.set_minor_formatter(NullFormatter())  # labels of minor ticks overlap
     axes.tick_params(labelsize=5.5)

@@ -146,6 +146,7 @@ def excess(inequality: Inequality, runs: Outcomes, metrics: Mapping[str, Metric]
     Relative to 1 where the bound is 0; infinite where the statistic is.
     """
     reached = evaluate(inequality.tree, runs, metrics, -math.inf if inequality.upward else math.inf)
+    # The worst is +inf here whichever side is good, so it counts as an excess in both cases.
     over = (
         inequality.bound - reached
         if inequality.upward and math.isfinite(reached)

@@ -105,6 +105,7 @@ class SearchResults:
                 number if self.settles(law, when) and math.isfinite(number) else math.nan
                 for law, number in zip(table.law, table[f"objective_{when}"], strict=True)
             ]
+            # Int64, not int: a law that does not settle has no rank, and stays missing.
             table[f"rank_{when}"] = pd.Series(objectives).rank(method="min").astype("Int64")
             table[f"better_than_{when}"] = [self._better_than(law, when) for law in table.law]
         ranges: dict[str, tuple[float, float]] = {}
@@ -326,6 +327,7 @@ class SearchResults:
         for trials in self.trials[law]:
             for part in range(PARTS):
                 kept = [trial for place, trial in enumerate(trials) if place % PARTS != part]
+                # As many as are left of FEWEST trials without one of their parts.
                 if len(kept) >= FEWEST * (PARTS - 1) / PARTS:
                     importance = importances(
                         self.plan.gains[law], [t.gains for t in kept], [t.value for t in kept]

@@ -75,8 +75,10 @@ class Sampler:
     def _sampler_for(self, batch: int) -> Any:
         """An Optuna sampler whose seed depends on the search and `batch` only."""
         text = json.dumps([*self._seed, batch])
+        # numpy's older generator, which Optuna uses, takes seeds of 32 bits.
         seed = int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "little")
         samplers = self._optuna.samplers
+        # A batch is asked before any of its trials has a value; `constant_liar` keeps them apart.
         return samplers.TPESampler(
             n_startup_trials=STARTUP, multivariate=True, constant_liar=True, seed=seed
         )

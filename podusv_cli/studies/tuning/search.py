@@ -249,4 +249,5 @@ class GainSearch:
 
 def _far(best: float, value: float) -> bool:
     """Whether a value is worse than the best by more than WORSE - 1 times its size."""
+    # Not WORSE * best: an objective may be negative, and that would then be better.
     return value > best + (WORSE - 1.0) * abs(best)

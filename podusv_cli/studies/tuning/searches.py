@@ -125,6 +125,7 @@ def compare_laws(
     with np.errstate(invalid="ignore", divide="ignore"):
         ratios = np.array([np.log(reached[a]) - np.log(reached[b]) for a, b in pairs])
         spread = np.array([np.log(samples[a]) - np.log(samples[b]) for a, b in pairs])
+        # Without pairs, the array has only one axis.
         spread = spread.reshape(len(pairs), SAMPLES)
         # Drawn with replacement, few training sets scatter less than sets do.
         # So the spread is widened as a sample variance is, by n / (n - 1).
@@ -152,6 +153,7 @@ def _sample_reached(
     (SAMPLES, 1, sets) those of training sets. Shape (SAMPLES,).
     """
     by_search = np.stack([np.median(runs[met], axis=1) for runs in table], axis=1)
+    # A law that was not searched has no searches to draw, whatever the training sets are.
     if len(table) == 1:
         return by_search[:, 0]
     sets = trained.shape[-1]
@@ -164,6 +166,7 @@ def _sample_reached(
 
 def _one_sided(ratio: float) -> float:
     """A ratio of which one side, or both, failed."""
+    # NaN is that of two failures: none of the two is ahead.
     return 1.0 if np.isnan(ratio) else float(np.exp(ratio))
 
 
