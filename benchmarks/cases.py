@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parent.parent
 SCENARIO = ROOT / "configs" / "mu_2017" / "corrected.yaml"
 RIVALS = ROOT / "configs" / "laws" / "rivals.yaml"  # all laws on the same task
 
-LAWS = ("adaptive_neural", "dsc", "backstepping", "pid")
+LAWS = ("adaptive_neural", "dsc", "full_backstepping", "pid")
 
 # The grid of the scenario has 27 nodes; an axis with one node needs widths.
 NETWORKS = {

@@ -381,7 +381,7 @@ static void read_list(Network *net)
 
 static int named(const char *name)
 {
-    const char *names[] = {"adaptive_neural", "dsc", "backstepping", "pid"};
+    const char *names[] = {"adaptive_neural", "dsc", "full_backstepping", "pid"};
     for (int i = 0; i < 4; i++)
         if (strcmp(name, names[i]) == 0)
             return i;

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from functools import wraps
+from pathlib import Path
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 from podusv_cli.core.errors import PodusvError, UsageError
@@ -11,6 +13,7 @@ from podusv_cli.core.errors import PodusvError, UsageError
 if TYPE_CHECKING:
     import pandas as pd
 
+ROOT = Path(__file__).parents[1]
 Given = ParamSpec("Given")
 Result = TypeVar("Result")
 
@@ -29,6 +32,17 @@ def interrupt_with(runs: pd.DataFrame) -> KeyboardInterrupt:
     # No class of its own: Python tells the shell of an interrupt only where it is this very class.
     vars(stop)["runs"] = runs
     return stop
+
+
+def user_level() -> int:
+    """The `stacklevel` with which a warning from the caller names the user's line.
+
+    How many frames of podusv lie between differs from function to function of the interface.
+    """
+    frame, own, level = sys._getframe(1), str(ROOT), 1
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(own):
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 def with_short_traceback(function: Callable[Given, Result]) -> Callable[Given, Result]:

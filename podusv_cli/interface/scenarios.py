@@ -15,6 +15,7 @@ import numpy as np
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import unknown_codes
+from podusv_cli.interface.border import user_level
 from podusv_cli.scenario import model, plugins
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Check, Loaded, Plugged, load_text
@@ -92,7 +93,7 @@ def load_scenario(
     if silent:
         return result
     return result.warn_of_remarks(
-        lambda lost: warnings.warn(lost.removeprefix("warning: "), stacklevel=4)
+        lambda lost: warnings.warn(lost.removeprefix("warning: "), stacklevel=user_level())
     )
 
 

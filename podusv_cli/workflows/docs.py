@@ -119,9 +119,10 @@ def search(text: str) -> list[tuple[Section, str]]:
     Words count where they begin as asked, in any case. Raises UsageError where there is none.
     """
     words = [re.compile(rf"\b{re.escape(word)}", re.IGNORECASE) for word in text.split()]
-    scored = [(part.score(words), part) for name in names() for part in sections(name)]
+    every = [part for name in names() for part in sections(name)] if words else []
+    scored = [(part.score(words), part) for part in every]
     ranked = sorted((section for section in scored if section[0]), key=lambda section: -section[0])
-    if not ranked or not words:
+    if not ranked:
         raise UsageError(
             f"no page is called {text!r} or has all words of it{did_you_mean(text, names())} "
             "(`podusv docs` lists all pages)"

@@ -83,6 +83,9 @@ def test_a_word_that_no_page_has_is_refused_with_the_nearest_page(podusv: Comman
     said = podusv("docs", "studeis")
     assert said.code == 2
     assert "no page is called 'studeis' or has all words of it; did you mean 'studies'?" in said.err
+    said = podusv("docs", " ")
+    assert said.code == 2
+    assert "no page is called ' ' or has all words of it" in said.err
 
 
 def spoken(module: ast.Module) -> Iterator[str]:

@@ -221,7 +221,8 @@ class StudyDriver:
     def _next(self) -> Unit | None:
         """The next range of missing draws of a law in a cell, or None when all are handed out.
 
-        None, too, after a failure and when the time is over; units under way still come back.
+        None, too, after a failure and when the time is over; units under way still come back, and
+        so do the halves of one that ended its worker.
         """
         if self._halves:
             return self._halves.popleft()
