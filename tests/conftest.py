@@ -325,3 +325,11 @@ def own_handlers():
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
+
+
+@pytest.fixture(autouse=True)
+def papers_apart(request):
+    """Runs of whole papers are left in no checkout."""
+    if request.node.get_closest_marker("papers"):
+        folder = request.getfixturevalue("tmp_path")
+        request.getfixturevalue("monkeypatch").chdir(folder)
