@@ -100,6 +100,7 @@ def spoken(module: ast.Module) -> Iterator[str]:
     yield from (text for text in constants if isinstance(text, str) and text not in told)
 
 
+@pytest.mark.long
 def test_no_message_names_a_page_s_file_which_only_a_checkout_has() -> None:
     checkouts = re.compile(r"\b(?:docs|examples)/\w+\.\w+")
     package = ROOT / "podusv_cli"

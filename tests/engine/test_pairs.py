@@ -311,7 +311,7 @@ def test_the_draws_are_no_convenient_numbers():
 @pytest.mark.parametrize(
     ("name", "seed"),
     [
-        pytest.param(n, i, marks=[pytest.mark.long] * ((at + i // 2) % 3 != 2))
+        pytest.param(n, i, marks=[pytest.mark.long] * ((at + i // 2) % 6 != 2))
         for at, n in enumerate(PAIRS)
         for i in range(at % 2, DRAWS.get(n, FEW), 2)
     ],

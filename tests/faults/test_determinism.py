@@ -216,6 +216,7 @@ EXACT = {
 }
 
 
+@pytest.mark.long
 def test_kernels_take_nothing_from_the_c_library_that_it_may_round_otherwise():
     called = {
         name for path in (ROOT / "podusv_cli").rglob("*.py") for name in _calls_in_kernels(path)

@@ -45,6 +45,7 @@ def boats(tmp_path_factory):
     return folder
 
 
+@pytest.mark.long
 def test_a_hull_that_predicts_worse_than_the_vessel_is_written_with_force_alone(
     boats, tmp_path, podusv
 ):

@@ -300,6 +300,7 @@ def test_which_numbers_are_looked_for():
     assert given.position_noise(np.zeros(len(given.numbers))) > 0.5
 
 
+@pytest.mark.long
 def test_a_hull_comes_out_beside_positions_that_wander_and_a_compass_that_is_off():
     """Two numbers that begin 30 to 40 % off, from 240 s; the errors come out with them."""
     logs = [boat_log((0.01, 0.005, 0.002), compass=0.09, wander=0.8, seed=seed) for seed in (3, 4)]

@@ -56,6 +56,7 @@ def close_over(number):
     return lambda tell: number**2
 
 
+@pytest.mark.long
 def test_a_worker_begins_empty_and_does_one_job_after_the_other(spawned):
     outcomes = run_all([partial(words_of, "podusv_cli.figures.page")] * 3, workers=1)
     assert [outcome.result for outcome in outcomes] == [False] * 3

@@ -167,6 +167,7 @@ UNHURRIED = (HealthCheck.filter_too_much, HealthCheck.too_slow)
 
 @settings(max_examples=5, deadline=None, suppress_health_check=UNHURRIED)
 @given(SCENARIOS)
+@pytest.mark.long
 def test_a_resolved_scenario_reads_back_to_the_same_bits(data):
     scenario = possible(data)
     again = load_stored(resolved_yaml(scenario), "resolved.yaml").scenario

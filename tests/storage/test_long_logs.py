@@ -80,6 +80,7 @@ def test_pods_leave_the_same_files(tmp_path):
     same_files(tmp_path, scenario(actuator=POD, law="pid", period=0))
 
 
+@pytest.mark.long
 def test_machine_code_leaves_the_same_files_and_figures(tmp_path):
     text = scenario(actuator="{kind: saturated}", law="pid", period=0, compiled="true")
     same_files(tmp_path, text.replace("duration: 0.4", "duration: 60.0"), figures=True)

@@ -321,6 +321,7 @@ def test_text_of_users_is_escaped_on_the_page():
     assert "&lt;i&gt;" in page(made, [], {"argv": "<i>"})
 
 
+@pytest.mark.long
 def test_every_file_of_the_shipped_bench_makes_a_case_that_is_valid():
     folder = shipped_bench()
     names = {axis: sorted(p.stem for p in (folder / axis).iterdir()) for axis in AXES}

@@ -96,6 +96,7 @@ def test_simulated_demands_may_be_late_by_the_delay_margin(law):
     assert rates[0] < 0.0 < rates[1], (margin, rates)
 
 
+@pytest.mark.long
 def test_a_law_of_two_demands_has_two_loops_behind_a_full_actuator():
     task = BOAT + "path: {kind: line}\ncontroller: {kind: velocity_vector}\n"
     plan = loaded_pose(task, "simulation.duration=60").plan()
