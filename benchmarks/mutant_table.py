@@ -154,6 +154,8 @@ TABLE: dict[str, list[Row]] = {
     ("        if len(jumps):\n", "        if False:\n", "test_a_position_that_jumps_is_a_warning"),
 ],
 "identify": [
+    ("given = replace(problem, gusts=asked)", "given = problem",
+     "test_a_sea_that_is_asked_for_is_not_looked_for"),
     ("return STABLE / decay if decay > 0.0 else math.inf", "return math.inf",
      "test_the_filter_of_a_boat_that_brakes_yaw_hard_stays_finite"),
     ("decay = 2.0 * max(surge", "decay = max(surge",

@@ -79,6 +79,7 @@ class Identified:
             "status": self.status,
             "folder": str(self.folder),
             "settled": self.answer.estimate.settled,
+            "gusts": self.answer.problem.gusts,
             "refused": self.refusal,
             "known": self.answer.determined_count,
             "of": len(self.answer.problem.hull),

@@ -68,10 +68,15 @@ def _sensors(answer: Identification) -> list[str]:
     if problem.gusts:
         k = problem.values(answer.estimate.y)
         force, moment = (k[q] / (2.0 * math.sqrt(k[SWINGS] * k[RATE])) for q in ("q_b", "q_b_psi"))
+        why = (
+            "Loads are taken for those of gusts, as asked for"
+            if problem.wanted.gusts
+            else "Loads of gusts explain the logs better than loads that wander (gusts: false "
+            "takes these all the same)"
+        )
         lines.append(
-            "Loads of gusts explain the logs better than loads that wander: about the means of the "
-            f"logs they have an rms of {force:.2g} N north and east and {moment:.2g} N m, at rates "
-            f"up to about {_with_ends(found[RATE], 'rad/s')}."
+            f"{why}: about the means of the logs they have an rms of {force:.2g} N north and east "
+            f"and {moment:.2g} N m, at rates up to about {_with_ends(found[RATE], 'rad/s')}."
         )
     return lines
 

@@ -95,6 +95,12 @@ class Identify(Component):
         f"{WANDER}, of a position's error that wanders, by default as the logs say, 0: none; "
         f"{COMPASS}, by how much a compass may be off, by default {COMPASS_OFF:g}, 0: not at all",
     )
+    gusts: bool | None = value(
+        None,
+        "",
+        "whether loads along the logs swing about a mean, as those of gusts, or wander; null: "
+        "what the logs are likelier with",
+    )
     current: float | None = value(
         None,
         "m/s",

@@ -116,6 +116,21 @@ def test_which_sea_is_kept(log, monkeypatch):
     assert kept(*stuck, of(58.0), trials=[99.0, 45.0], swinging=[40.0]) == (True, 40.0)
 
 
+@pytest.mark.parametrize("asked", [True, False])
+def test_a_sea_that_is_asked_for_is_not_looked_for(log, monkeypatch, asked):
+    sought = []
+
+    def estimate(search, tell):
+        sought.append(search.size)
+        return HullEstimate(np.zeros(search.size), 1.0, np.eye(search.size), 3, settled=True)
+
+    monkeypatch.setattr(gusts, "estimate_hull", estimate)
+    given, found = estimate_in_sea(problem([log], free=("m33",), gusts=asked), lambda *_: None)
+    assert given.gusts is asked
+    assert sought == [len(given.numbers)] == [len(found.y)]
+    assert ({*GUSTS} <= {number.name for number in given.numbers}) is asked
+
+
 def test_searches_that_were_made_before_count_with_those_to_come(log):
     """Two that have come to the same are enough, and no other begins."""
     given = problem([log], free=("m33",))

@@ -33,9 +33,13 @@ LOADS = (*WALKS[3:], *GUSTS)
 def estimate_in_sea(problem: FitProblem, tell: Tell) -> tuple[FitProblem, HullEstimate]:
     """The best numbers, and in which sea: loads that wander, or gusts where these are likelier.
 
-    An interrupt leaves the best so far.
+    What `identify.gusts` asks for is not looked for. An interrupt leaves the best so far.
     """
-    return SeaSearch(problem, tell).estimate()
+    asked = problem.wanted.gusts
+    if asked is None:
+        return SeaSearch(problem, tell).estimate()
+    given = replace(problem, gusts=asked)
+    return given, estimate_hull(given.search, tell)
 
 
 @dataclass(frozen=True)
