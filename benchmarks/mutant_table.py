@@ -868,6 +868,7 @@ TABLE: dict[str, list[Row]] = {
      "test_surge_is_wanted_as_far_as_the_bow_points_there_and_N_m_turns_it"),
 ],
 "actuators": [
+    ("if drag >= self.T_nn:", "if False:", "test_a_rudder_that_stops_its_boat_is_refused"),
     ("return self.cuts and not self.by_delay_line", "return self.cuts",
      "test_an_fmu_begins_where_the_run_does_and_asks_for_loads_that_it_cannot_know"),
     ("-k.surge_limit), k.surge_limit)\n        tau[1] = 0.0",

@@ -128,6 +128,19 @@ class Pod(Component):
             )
         return self
 
+    @model_validator(mode="after")
+    def _pushing(self) -> Self:
+        """Raises ValueError for a rudder that holds back all that the propeller pushes."""
+        if self.rudder and self.T_nn is not None:
+            most = min(self.angle_limit, self.rudder.stall)
+            drag = self.rudder.lift * most * math.sin(most)
+            if drag >= self.T_nn:
+                raise ValueError(
+                    f"has a rudder that at {most:.3g} rad drags {drag:.3g} n^2, and a propeller "
+                    f"that pushes {self.T_nn:.3g} n^2; give a smaller lift, stall or angle_limit"
+                )
+        return self
+
     def _check_beside_table(self, given: Sequence[str]) -> None:
         """Raise ValueError for keys that do not go with a table; `given` are those `BY_SQUARE`."""
         if given:

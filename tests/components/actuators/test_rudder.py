@@ -178,6 +178,21 @@ def test_the_rudders_of_cybership2_have_the_published_force_at_rest():
     assert rudder.lift * rudder.stall == pytest.approx(largest, rel=3e-3)
 
 
+def test_a_rudder_that_stops_its_boat_is_refused():
+    """At a = 0.7 rad lift a sin a is 0.451 of the lift: thrust is left for 0.99, none for 1.3."""
+    wide = {**RUDDER, "T_nn": 0.45, "T_nn_astern": 0.45, "angle_limit": 0.7}
+
+    def pods(lift):
+        return Pods(kind="pod", pods=[{**wide, "rudder": {"lift": lift, "stall": 0.7}}])
+
+    straight = pods(0.99).settled(np.zeros(6), np.array([1e4, 0.0]))
+    assert straight == pytest.approx([0.45 * RUDDER["n_max"] ** 2, 0.0, 0.0])
+    with pytest.raises(
+        ValueError, match=r"at 0.7 rad drags 0.586 n\^2, and a"
+    ):
+        pods(1.3)
+
+
 def test_a_rudder_that_cannot_turn_is_refused_and_a_failure_takes_its_force(tmp_path):
     with pytest.raises(
         ScenarioError, match="has a rudder that cannot turn; give it an angle_limit"
