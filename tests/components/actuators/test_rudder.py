@@ -187,9 +187,7 @@ def test_a_rudder_that_stops_its_boat_is_refused():
 
     straight = pods(0.99).settled(np.zeros(6), np.array([1e4, 0.0]))
     assert straight == pytest.approx([0.45 * RUDDER["n_max"] ** 2, 0.0, 0.0])
-    with pytest.raises(
-        ValueError, match=r"at 0.7 rad drags 0.586 n\^2, and a"
-    ):
+    with pytest.raises(ValueError, match=r"at 0.7 rad drags 0.586 n\^2, and a"):
         pods(1.3)
 
 
