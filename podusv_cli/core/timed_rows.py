@@ -82,9 +82,9 @@ def named_rows(text: str, noun: str) -> NamedRows:
 
 
 def lines_of(text: str) -> tuple[TextLine | None, list[TextLine]]:
-    """The header, which is a first line of several cells without any number, and all other lines.
+    """The header, which is a first line of several cells without any number, and the other lines.
 
-    # starts a comment.
+    # starts a comment; lines without anything else are left out.
     """
     # Programs on Windows begin a text with a byte order mark
     lines = [line.partition("#")[0].strip() for line in text.removeprefix("\ufeff").splitlines()]

@@ -5,6 +5,7 @@ Drawing imports matplotlib, which is slow: `sketches_of` gives what draws, `page
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -98,7 +99,8 @@ def _track(east: Vector, north: Vector) -> Figure:
 
 
 def _signals(contents: Contents, found: Listing, part: Sequence[Listed]) -> Figure:
-    rows = -(-len(part) // 2)
+    """Some of a log's columns over the time, in two rows of panels beside each other."""
+    rows = math.ceil(len(part) / 2)
     figure = new_figure(COLUMNS, ROW * rows + 0.5)
     panels = figure.subplots(rows, 2, squeeze=False).ravel()
     for axes, own in zip(panels, part, strict=False):
@@ -108,6 +110,7 @@ def _signals(contents: Contents, found: Listing, part: Sequence[Listed]) -> Figu
         alone = "." if there.sum() == 1 else ""  # a line through one value would not be seen
         axes.plot(*thin_curve(times[there], values[there]), lw=0.7, marker=alone)
         guess = f" = {own.guess}" if own.guess else ""
+        # Of a long name the end is its own; the beginning is that of its topic
         axes.set_title(escaping.figure(f"{own.name[-ENDING:]}{guess}"), fontsize="x-small")
         axes.yaxis.set_major_formatter(PlainNumbers(useOffset=False))  # it would cross the title
         axes.set_xlabel(label, fontsize="x-small")

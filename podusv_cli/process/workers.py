@@ -179,7 +179,7 @@ class Forked:
     """A process a job: it inherits the job, and all code that is imported and compiled."""
 
     def __init__(self) -> None:
-        """A crew that forks a process for every job, so that jobs share nothing."""
+        """A crew that forks a process for every job, so that none changes anything of another."""
         self._context: Any = multiprocessing.get_context("fork")
 
     def begin(self, job: Job, others: Iterable[Pipe]) -> tuple[Pipe, BaseProcess]:

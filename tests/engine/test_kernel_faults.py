@@ -50,6 +50,7 @@ UNSET = {
     "a kind without a number": "if x[0] > 0.0:\n q: float\nelse:\n q = 1.0\ny = q",
     "no rounds at all": "for i in range(0):\n q = 1.0\ny = q",
     "added to": "if x[0] > 0.0:\n q = 1.0\nq += 1.0",
+    "read in its own assignment": "y = (q := q + x[0])",
     "read in its own loop": "for i in range(3):\n if x[i] > 0.0:\n  y = q\n q = x[i]",
 }
 
@@ -75,7 +76,7 @@ def test_a_variable_that_may_be_unset_is_named_with_its_line(body: str) -> None:
 
 
 def reads_q(text: str) -> bool:
-    return text.strip() in ("y = q", "q += 1.0")
+    return text.strip() in ("y = q", "q += 1.0", "y = (q := q + x[0])")
 
 
 @pytest.mark.parametrize(

@@ -182,7 +182,8 @@ class Waypoints(Path):
     def table(self) -> Vector:
         """The knots, eight coefficients a knot: cubic in x and in y, highest power first; corners.
 
-        The last knot's are those of what comes after it: straight on or at rest. The corners are
+        The last knot's are those of what comes after it: straight on or at rest; on a loop nothing
+        reads them. The corners are
         those that a law sees rounded, if any.
         """
         knots, cubic = self._knots(), self._cubic()

@@ -156,8 +156,6 @@ class Reads:
         """Note every name that is read in a part of a statement and has maybe no value."""
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
             self._note(node, known)
-        if isinstance(node, ast.NamedExpr):  # it has a value for what stands behind it
-            known |= _names_stored(node)
         for part in ast.iter_child_nodes(node):
             if not isinstance(part, SCOPES):
                 self._read(part, known)

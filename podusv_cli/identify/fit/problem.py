@@ -275,9 +275,9 @@ class FitProblem:
         return own.changed(new | added)
 
     def before(self, y: Vector) -> Vector:
-        """The point of the hull before the logs, whose sensors are as they are at a point.
+        """The point with the hull and the sea of before the logs, and with the sensors of a point.
 
-        A compass that is off says nothing against a hull.
+        The hull of before is judged with this: it is not to blame for a compass that is off.
         """
         sensed = (*SIGMAS, DEVIATION, LASTING, COMPASS)
         return np.array([e * (n.name in sensed) for n, e in zip(self.numbers, y, strict=True)])

@@ -241,7 +241,10 @@ def _numbers(cells: Sequence[str]) -> Vector:
 
 
 def _seconds(cells: Sequence[str]) -> tuple[Vector, str]:
-    """Dates as seconds since 1970, and how many are none."""
+    """Dates as seconds since 1970, NaN for what is none; words about these, if there are any.
+
+    Dates without a zone are those of UTC; an empty cell is NaN without a word.
+    """
     import pandas as pd  # slow to import
 
     dates = pd.to_datetime(pd.Series(cells), errors="coerce", format="ISO8601", utc=True)

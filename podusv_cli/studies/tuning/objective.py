@@ -159,7 +159,8 @@ def _evaluate(node: ast.expr, walk: OfGains, worst: float) -> Any:
     """The value of an expression; `worst` is what stands for a failed run, inf or -inf.
 
     The sign of `worst` follows the operators, so that a failure never improves the whole: in a - b,
-    the worst of b is its smallest value.
+    the worst of b is its smallest value. `walk` notes the metrics that are named. Raises
+    ExpressionError for what is no statistic.
     """
     match node:
         case ast.Constant():
@@ -171,7 +172,9 @@ def _evaluate(node: ast.expr, walk: OfGains, worst: float) -> Any:
             second = -worst if isinstance(sign, SCALING) and _is_negative(left) else worst
             second = -second if isinstance(sign, FALLING) else second
             parts = _evaluate(left, walk, first), _evaluate(right, walk, second)
-            return ARITHMETIC[type(sign)](*parts)
+            # Over an infinite number the whole would be 0, which is the best of an objective
+            failed = isinstance(sign, ast.Div) and math.isinf(parts[1])
+            return worst if failed else ARITHMETIC[type(sign)](*parts)
         case ast.BinOp():
             refuse(node, "calculate with + - * / only")
         case ast.Name(id=name) if name == FAILURES:

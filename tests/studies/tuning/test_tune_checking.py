@@ -194,6 +194,7 @@ def test_what_nobody_knows_is_the_worst():
     runs = Outcomes({"iae": np.full(4, np.nan)}, np.zeros(4, bool))
     assert evaluate(parse_objective("median(iae)", METRICS), runs, METRICS) == math.inf
     assert evaluate(parse_objective("median(iae) - median(iae)", METRICS), runs, METRICS) > 1e300
+    assert evaluate(parse_objective("1 / median(iae)", METRICS), runs, METRICS) == math.inf
 
 
 @pytest.mark.parametrize(
