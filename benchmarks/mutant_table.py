@@ -101,8 +101,11 @@ TABLE: dict[str, list[Row]] = {
      "test_a_log_that_is_mapped_lies_in_no_folder_that_is_renamed"),
 ],
 "identify/logs": [
-    ("(np.arange(len(rested)) >= at)", "(np.arange(len(rested)) >= 0)",
+    ("(np.arange(len(most)) >= at)", "(np.arange(len(most)) >= 0)",
      "test_a_log_counts_from_where_lags_forget_what_was_before"),
+    ("ends = np.minimum(inputs.min(axis=0), 0.0), np.maximum(inputs.max(axis=0), 0.0)",
+     "ends = 0.0 * inputs[0], inputs[0]",
+     "test_a_log_that_begins_with_a_stop_does_not_say_that_propellers_stood"),
     ("np.flatnonzero(unlike)[-1]) + 1", "np.flatnonzero(unlike)[0]) + 1",
      "test_what_pods_did_is_that_of_another_program"),
     ("piece for piece in found if _long(piece, 0, len(piece.times))", "piece for piece in found",

@@ -22,7 +22,13 @@ from podusv_cli.identify.logs.checks import check_log
 from podusv_cli.identify.logs.commands import with_actuator_state, with_known_state
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.motion import BinnedMotion
-from podusv_cli.identify.logs.reading import CLOCK, LogTable, NamedQuantities, tables
+from podusv_cli.identify.logs.reading import (
+    CLOCK,
+    LogTable,
+    NamedQuantities,
+    delivered_each,
+    tables,
+)
 from podusv_cli.identify.offsets import Clocks
 from podusv_cli.scenario.identify import LogFile
 from podusv_cli.scenario.model import Scenario
@@ -152,15 +158,21 @@ def _long_ones(found: Sequence[LogTable]) -> list[LogTable]:
     kept = [piece for piece in found if _long(piece, 0, len(piece.times))]
     if not kept:
         raise LogFault(
-            f"{found[0].name}: its pieces between gaps end before the actuator's lags forget what "
-            "was commanded ahead of them; take a longer part of the log, or name the columns of "
-            "what the actuator did"
+            f"{found[0].name}: {'it ends' if len(found) == 1 else 'its pieces between gaps end'} "
+            "before the actuator's lags forget what was commanded ahead; take a longer part of the "
+            "log, or name the columns of what the actuator did"
         )
     warnings = tuple(line for piece in found for line in piece.warnings)
+    short = [piece.name for piece in found if not _long(piece, 0, len(piece.times))]
+    if short:
+        warnings += (
+            f"{', '.join(short)}: left out, as too little comes behind where the actuator's lags "
+            "forget what was commanded ahead.",
+        )
     return [replace(kept[0], warnings=warnings), *kept[1:]]
 
 
 def _long(log: LogTable, begin: int, end: int) -> bool:
-    """Whether enough of the pose is in these rows."""
-    pose = [log.columns[signal.name][begin:end] for signal in STATE[:POSE]]
-    return min(int(np.isfinite(values).sum()) for values in pose) >= FEWEST
+    """Whether enough of the pose is delivered in these rows."""
+    pose = {signal.name: log.columns[signal.name][begin:end] for signal in STATE[:POSE]}
+    return min(int(new.sum()) for new in delivered_each(pose).values()) >= FEWEST

@@ -99,7 +99,7 @@ def _track(east: Vector, north: Vector) -> Figure:
 
 
 def _signals(contents: Contents, found: Listing, part: Sequence[Listed]) -> Figure:
-    """Some of a log's columns over the time, in two rows of panels beside each other."""
+    """Some of a log's columns over the time, two panels in a row."""
     rows = math.ceil(len(part) / 2)
     figure = new_figure(COLUMNS, ROW * rows + 0.5)
     panels = figure.subplots(rows, 2, squeeze=False).ravel()

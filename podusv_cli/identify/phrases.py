@@ -72,7 +72,7 @@ def _sensors(answer: Identification) -> list[str]:
             "Loads are taken for those of gusts, as asked for"
             if problem.wanted.gusts
             else "Loads of gusts explain the logs better than loads that wander (gusts: false "
-            "takes these all the same)"
+            "takes the latter)"
         )
         lines.append(
             f"{why}: about the means of the logs they have an rms of {force:.2g} N north and east "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from functools import wraps
@@ -39,7 +40,7 @@ def user_level() -> int:
 
     How many frames of podusv lie between differs from function to function of the interface.
     """
-    frame, own, level = sys._getframe(1), str(ROOT), 1
+    frame, own, level = sys._getframe(1), f"{ROOT}{os.sep}", 1
     while frame.f_back is not None and frame.f_code.co_filename.startswith(own):
         frame, level = frame.f_back, level + 1
     return level

@@ -85,6 +85,16 @@ def test_a_log_counts_from_where_lags_forget_what_was_before(pods):
     assert log.notes[0].endswith("It counts from 9.4 s on, where they forget what was before.")
 
 
+def test_a_log_that_begins_with_a_stop_does_not_say_that_propellers_stood(pods):
+    """What turns at 10 as a log begins with 0 turns at 10 exp(-t / 0.5): 1 % of it after 2.3 s."""
+    times = np.arange(0.0, 9.0, 0.1)
+    ordered = {"n_cmd_1": np.where(times < 4.0, 0.0, 10.0), "delta_cmd_1": np.zeros(len(times))}
+    log = with_known_state(LogTable("a.csv", times, ordered), pods)
+    assert log.times[0] == pytest.approx(2.4)
+    ordered["n_cmd_1"] = 0.0 * times
+    assert with_known_state(LogTable("a.csv", times, ordered), pods).times[0] == 0.0
+
+
 @pytest.mark.parametrize("begin", [0.0, 29.4])
 def test_what_pods_did_is_that_of_another_program(sailed, begin):
     """A log from rest, which commands do not say, and one that begins under way."""
@@ -107,6 +117,6 @@ def test_pieces_that_end_before_lags_forget_are_left_out(sailed, tmp_path):
 
     (log,) = logs([6.0])
     assert log.times[0] > 18.0
-    assert any("it is taken as 2 logs" in line for line in log.warnings)
-    with pytest.raises(UsageError, match="end before the actuator's lags forget what"):
+    assert any("a.csv from 0 s: left out, as too little comes" in line for line in log.warnings)
+    with pytest.raises(UsageError, match="its pieces between gaps end before the actuator's lags"):
         logs(np.arange(6.0, 60.0, 9.0))

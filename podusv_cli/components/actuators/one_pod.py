@@ -130,10 +130,10 @@ class Pod(Component):
 
     @model_validator(mode="after")
     def _pushing(self) -> Self:
-        """Raises ValueError for a rudder that holds back all that the propeller pushes."""
+        """Raises ValueError for a rudder that can hold back all that the propeller pushes."""
         if self.rudder and self.T_nn is not None:
-            most = min(self.angle_limit, self.rudder.stall)
-            drag = self.rudder.lift * most * math.sin(most)
+            most = min(self.angle_limit, 0.5 * math.pi)
+            drag = self.rudder.lift * min(most, self.rudder.stall) * math.sin(most)
             if drag >= self.T_nn:
                 raise ValueError(
                     f"has a rudder that at {most:.3g} rad drags {drag:.3g} n^2, and a propeller "

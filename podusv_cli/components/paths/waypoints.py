@@ -183,8 +183,7 @@ class Waypoints(Path):
         """The knots, eight coefficients a knot: cubic in x and in y, highest power first; corners.
 
         The last knot's are those of what comes after it: straight on or at rest; on a loop nothing
-        reads them. The corners are
-        those that a law sees rounded, if any.
+        reads them. The corners are those that a law sees rounded, if any.
         """
         knots, cubic = self._knots(), self._cubic()
         end = cubic(knots[-1])

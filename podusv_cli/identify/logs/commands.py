@@ -31,20 +31,22 @@ def with_actuator_state(table: LogTable, actuator: Actuator) -> LogTable:
 def with_known_state(table: LogTable, actuator: Actuator) -> LogTable:
     """The same, from where it does not matter what the actuator did before the log began.
 
-    There it is in one state, whether it was at rest before or had followed its commands. A log of
-    commands alone has no rows where that is nowhere.
+    There it is in one state, wherever it was before between rest and the least and the largest that
+    the log commands: lags do not overtake each other. A log of commands alone has no rows where
+    that is nowhere.
     """
     whole = with_actuator_state(table, actuator)
     names, lacking, inputs = _commanded(table, actuator)
     if not lacking:
         return whole
-    rested = _lag_commands(table.times, inputs, actuator, np.zeros(len(names)))
-    did = np.column_stack([whole.columns[name] for name in lacking])
-    at = _first_known(did, rested[:, [names.index(name) for name in lacking]])
-    if 0 < at < len(rested):
+    ends = np.minimum(inputs.min(axis=0), 0.0), np.maximum(inputs.max(axis=0), 0.0)
+    least, most = (_lag_commands(table.times, inputs, actuator, end) for end in ends)
+    places = [names.index(name) for name in lacking]
+    at = _first_known(least[:, places], most[:, places])
+    if 0 < at < len(most):
         since = f"It counts from {table.times[at]:.10g} s on, where they forget what was before."
         whole = replace(whole, notes=(*whole.notes[:-1], f"{whole.notes[-1]} {since}"))
-    return whole.where(np.arange(len(rested)) >= at)
+    return whole.where(np.arange(len(most)) >= at)
 
 
 def _commanded(table: LogTable, actuator: Actuator) -> tuple[list[str], list[str], Vector]:
@@ -62,7 +64,8 @@ def _commanded(table: LogTable, actuator: Actuator) -> tuple[list[str], list[str
 
 def _first_known(one: Vector, other: Vector) -> int:
     """The first row from which on two courses of the states are one; behind the last if none is."""
-    unlike = np.any(np.abs(one - other) > KNOWN * np.abs(one).max(axis=0), axis=1)
+    largest = np.maximum(np.abs(one), np.abs(other)).max(axis=0)
+    unlike = np.any(np.abs(one - other) > KNOWN * largest, axis=1)
     return int(np.flatnonzero(unlike)[-1]) + 1 if unlike.any() else 0
 
 

@@ -111,7 +111,7 @@ class Results:
         gathered = self.runs.metrics
         headlines = [m for m in gathered if self.known_metrics[m].headline]
         usual = [m for m in gathered if m in ALWAYS] or headlines
-        shown = [m for m in gathered if m in usual or re.search(rf"\.{m}\b", expected)]
+        shown = [m for m in gathered if m in usual or re.search(rf"\.{re.escape(m)}\b", expected)]
         return sorted(shown, key=lambda name: not self.known_metrics[name].headline)
 
     def without_verdicts(self, contradicted: str) -> Results:

@@ -172,7 +172,7 @@ def _evaluate(node: ast.expr, walk: OfGains, worst: float) -> Any:
             second = -worst if isinstance(sign, SCALING) and _is_negative(left) else worst
             second = -second if isinstance(sign, FALLING) else second
             parts = _evaluate(left, walk, first), _evaluate(right, walk, second)
-            # Over an infinite number the whole would be 0, which is the best of an objective
+            # Over an infinite number the whole would be 0, which may be better than all others
             failed = isinstance(sign, ast.Div) and math.isinf(parts[1])
             return worst if failed else ARITHMETIC[type(sign)](*parts)
         case ast.BinOp():
