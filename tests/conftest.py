@@ -329,7 +329,7 @@ def own_handlers():
 
 @pytest.fixture(autouse=True)
 def papers_apart(request):
-    """Runs of whole papers are left in no checkout."""
+    """Runs of whole papers are left in no checkout; a module's own fixture sees to its folder."""
     if request.node.get_closest_marker("papers"):
         folder = request.getfixturevalue("tmp_path")
         request.getfixturevalue("monkeypatch").chdir(folder)

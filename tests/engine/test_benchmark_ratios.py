@@ -9,12 +9,15 @@ import pytest
 from benchmarks.alternatives import python_alternatives
 from benchmarks.batch import batch_costs, side_by_side_laws
 from benchmarks.c_program import TOLERANCE, agreement, build
-from benchmarks.cases import CASES, Case
+from benchmarks.cases import CASES, Case, rivals
 from benchmarks.engine import beside_c, growth
 from benchmarks.side_by_side import side_by_side_costs
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.core.registry import kinds
 
 benchmark = pytest.mark.benchmark
-needs_cc = pytest.mark.skipif(not shutil.which("cc"), reason="needs a C compiler")
+COMPILERS = ("cc", "gcc", "clang")  # as `c_program` takes them
+needs_cc = pytest.mark.skipif(not any(map(shutil.which, COMPILERS)), reason="needs a C compiler")
 ROUNDS = 9
 every_case = pytest.mark.parametrize("case", CASES, ids=[case.label for case in CASES])
 
@@ -95,3 +98,15 @@ def test_python_alternatives_are_slower_at_the_same_accuracy():
     assert np.isfinite(list(middle.values())).all()
     assert middle["solve_ivp"] >= 5 * middle["podusv"]
     assert middle["numpy"] >= 20 * middle["podusv"]
+
+
+def test_every_law_is_timed_or_known_not_to_be():
+    """Manoeuvres of trials and a schedule need few operations; the others have tasks of their own,
+    read a file, or are made of laws that are timed.
+    """
+    trials = {"schedule", "stopping", "turning_circle", "zigzag", "maneuvering"}
+    poses = {"pose_backstepping", "pose_pid", "pose_sliding_mode"}
+    others = {"ardupilot", "cascade", "los_backstepping", "mss", "policy", "px4"}
+    known = {*kinds("podusv_cli.components.controllers", Controller)}
+    timed = {loop.controller.kind for loop in rivals().values()}
+    assert known - timed == trials | poses | others
