@@ -157,6 +157,8 @@ TABLE: dict[str, list[Row]] = {
     ("        if len(jumps):\n", "        if False:\n", "test_a_position_that_jumps_is_a_warning"),
 ],
 "identify": [
+    ("<= SETTLED and _apart(best, e, hull) <= NEAR for e", "<= SETTLED for e",
+     "test_searches_that_end_at_one_value_with_two_hulls_have_not_come_to_the_same"),
     ("given = replace(problem, gusts=asked)", "given = problem",
      "test_a_sea_that_is_asked_for_is_not_looked_for"),
     ("return STABLE / decay if decay > 0.0 else math.inf", "return math.inf",

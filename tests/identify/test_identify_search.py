@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize
 
+from podusv_cli.identify.fit import estimate
 from podusv_cli.identify.fit.estimate import (
     HullEstimate,
     HullSearch,
@@ -135,3 +136,19 @@ def test_a_hull_is_left_as_it_was_where_the_filter_breaks_down_beside_the_rest()
     assert np.isfinite(kept.covariance).all()
     assert kept.y[0] == 0.0
     assert 0.5 < kept.y[1] <= 1.5
+
+
+def test_searches_that_end_at_one_value_with_two_hulls_have_not_come_to_the_same(monkeypatch):
+    """Three places of one value: the third is 1.4 standard deviations from the first."""
+    ends = [np.array([0.0, 9.0]), np.array([1.5, 9.0]), np.array([0.7, -9.0])]
+    spread = np.diag([0.25, 0.25])
+
+    def search(hull):
+        left = [HullEstimate(y, 10.0 + 0.1 * i, spread, 3) for i, y in enumerate(ends)]
+        monkeypatch.setattr(estimate, "_search_from", lambda *_: left.pop(0))
+        blocks = np.zeros(1, np.int64)
+        found = estimate_hull(HullSearch(lambda points: (np.ones(1), np.ones(1)), 2, blocks, hull))
+        return found.settled, len(left)
+
+    assert search(1) == (True, 0)
+    assert search(0) == (True, 1)  # without a hull the value is enough

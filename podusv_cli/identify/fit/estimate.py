@@ -36,6 +36,9 @@ DAMPINGS = (
 )
 STARTS, NEARER = 5, 0.5  # searches at most, and how far from the better start others begin
 SETTLED = 0.5  # of -2 log of the posterior: two searches that differ by less came to the same
+# Standard deviations between their hulls, at most. If -2 log of the posterior were a parabola two
+# points within SETTLED of its least would be 1.4 apart at most.
+NEAR = 2.0
 ENOUGH = 0.02  # of -2 log of the posterior: what a step has to gain, or the search ends
 # Posterior over prior standard deviation of a direction: above OPEN the logs do not determine it,
 # above SILENT they say next to nothing of it, and it stays as it was.
@@ -159,7 +162,7 @@ def estimate_hull(
     if not math.isfinite(found[0].value):
         raise UsageError(f"with the vessel as it is given {BREAKS}")
     rng = np.random.Generator(np.random.PCG64(search.size))
-    while len(found) < starts and not (found[-1].interrupted or _agree(found)):
+    while len(found) < starts and not (found[-1].interrupted or _agree(found, search.hull)):
         best = int(np.argmin([e.value for e in found]))
         start = starts_at[best] + NEARER * rng.standard_normal(search.size)
         if len(found) == 1 and search.second is not None:
@@ -170,14 +173,24 @@ def estimate_hull(
         except KeyboardInterrupt:  # before its first round
             found[-1] = replace(found[-1], interrupted=True)
     least = min(found, key=lambda e: e.value)
-    settled = _agree(found) or least.settled
+    settled = _agree(found, search.hull) or least.settled
     return replace(least, settled=settled, interrupted=found[-1].interrupted)
 
 
-def _agree(found: Sequence[HullEstimate]) -> bool:
-    """Whether two searches have come to the least value so far."""
-    values = sorted(e.value for e in found)
-    return len(values) > 1 and values[1] - values[0] <= SETTLED
+def _agree(found: Sequence[HullEstimate], hull: int) -> bool:
+    """Whether two searches have come to the least value so far, and to one hull.
+
+    Where all of a motion is taken for noise and loads, any hull has about the same value.
+    """
+    best, *others = sorted(found, key=lambda e: e.value)
+    return any(e.value - best.value <= SETTLED and _apart(best, e, hull) <= NEAR for e in others)
+
+
+def _apart(one: HullEstimate, other: HullEstimate, hull: int) -> float:
+    """How far two hulls are apart, in standard deviations of the first: Mahalanobis's distance."""
+    step = (other.y - one.y)[:hull]
+    squared = step @ np.linalg.solve(one.covariance[:hull, :hull], step) if hull else 0.0
+    return math.sqrt(max(float(squared), 0.0))
 
 
 def _search_from(search: HullSearch, y: Vector, tell: Tell) -> HullEstimate:
