@@ -19,7 +19,7 @@ def with_actuator_state(table: LogTable, actuator: Actuator) -> LogTable:
 
     Lags hang on no motion of the hull. What the log itself has of this stays.
     """
-    names, lacking, inputs = _commanded(table, actuator)
+    names, lacking, inputs = _take_commands(table, actuator)
     if not lacking:
         return table
     did = dict(zip(names, _lag_commands(table.times, inputs, actuator, inputs[0]).T, strict=True))
@@ -36,7 +36,7 @@ def with_known_state(table: LogTable, actuator: Actuator) -> LogTable:
     that is nowhere.
     """
     whole = with_actuator_state(table, actuator)
-    names, lacking, inputs = _commanded(table, actuator)
+    names, lacking, inputs = _take_commands(table, actuator)
     if not lacking:
         return whole
     ends = np.minimum(inputs.min(axis=0), 0.0), np.maximum(inputs.max(axis=0), 0.0)
@@ -49,7 +49,7 @@ def with_known_state(table: LogTable, actuator: Actuator) -> LogTable:
     return whole.where(np.arange(len(most)) >= at)
 
 
-def _commanded(table: LogTable, actuator: Actuator) -> tuple[list[str], list[str], Vector]:
+def _take_commands(table: LogTable, actuator: Actuator) -> tuple[list[str], list[str], Vector]:
     """What is `replayed`, what of it the log has commands of alone, and what all of it follows."""
     names = [signal.name for signal in actuator.replayed]
     commands = dict(zip(names, (signal.name for signal in actuator.lagged), strict=False))
